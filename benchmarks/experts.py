@@ -1,4 +1,4 @@
-"""Successes of the experts: benchmark by benchmark, robot by robot.
+"""Successes of the experts, and of doing nothing, benchmark by benchmark and robot.
 
 Episodes have seeds that were not used for tuning, from 7000 on. An episode counts as a
 success if the benchmark is solved within 500 steps, or 1000 for those with several
@@ -6,7 +6,8 @@ objects, or their own horizon for robots on feet. Results are added to
 docs/experts.json; `--table` writes that into docs/experts.md, and measures nothing.
 
 Usage: python benchmarks/experts.py [BENCHMARK ...] [--robots R[,R]] [--controller C]
-    [--seeds 100] [--base 7000] [--quick] [--json FILE]
+    [--policy expert|hold] [--horizon N] [--seeds 100] [--base 7000] [--quick]
+    [--json FILE]
        python benchmarks/experts.py --table
 """
 
@@ -26,6 +27,7 @@ from wbc_suite.evaluation.rollouts import run_episode
 ROOT = Path(__file__).parent.parent
 FOUND = ROOT / "docs" / "experts.json"
 PAGE = ROOT / "docs" / "experts.md"
+KEYS = ("benchmark", "robots", "controller")
 LONG = ("TwoArmTransport", "ToolHang", "NutAssembly", "PickPlace")
 ON_FEET = ("Stand", "Reach", "WalkTo", "LocoLift", "Carry")
 ALL = (
@@ -35,29 +37,37 @@ ALL = (
     *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover"),
     *LONG,
     *ON_FEET,
+    *("NutAssemblySingle", "PickPlaceSingle"),
 )
 
 
 def measure(
-    name: str, robots: str | None, controller: str | None, seeds: range
+    name: str,
+    policy: str,
+    robots: str | None,
+    controller: str | None,
+    seeds: range,
+    horizon: int | None = None,
 ) -> dict[str, Any]:
-    """Run the expert of a benchmark, and return what it came to."""
+    """Run a policy in a benchmark, and return what it came to."""
     arguments: dict[str, Any] = {}
-    if name not in ON_FEET:
-        arguments["horizon"] = 1000 if name in LONG else 500
+    if horizon or name not in ON_FEET:
+        arguments["horizon"] = horizon or (1000 if name in LONG else 500)
     if robots:
         each = robots.split(",")
         arguments["robots"] = each if len(each) > 1 else robots
     if controller:
         arguments["controller_configs"] = controller
     env = wbc_suite.make(name, terminate_on_success=True, **arguments)
-    played = [run_episode(env, env, seed, "expert") for seed in seeds]
+    played = [run_episode(env, env, seed, policy) for seed in seeds]
     env.close()
     steps = [e["steps"] for e in played if e["succeeded"]]
     return {
         "benchmark": name,
         "robots": " and ".join(robot.name for robot in env.robots),
         "controller": controller or "default",
+        "policy": policy,
+        "horizon": env.horizon,
         "successes": len(steps),
         "episodes": len(played),
         "interval": success_interval(len(steps), len(played)),
@@ -71,22 +81,32 @@ def measure(
     }
 
 
+def case(row: dict[str, Any]) -> tuple[str, ...]:
+    """Return what was measured: benchmark, robots, controller and policy."""
+    return (*(row[k] for k in KEYS), row.get("policy", "expert"))
+
+
 def table(rows: list[dict[str, Any]]) -> str:
-    """Return the results as a table in Markdown."""
+    """Return the results as a table in Markdown; `hold` is beside the expert."""
+    idle = {case(row)[:-1]: row for row in rows if case(row)[-1] == "hold"}
+    experts = {case(row)[:-1]: row for row in rows if case(row)[-1] == "expert"}
     lines = [
         "| benchmark | robots | controller | successes | 95 % interval "
-        "| steps: median, most | seeds from | date |",
-        "|---|---|---|---|---|---|---|---|",
+        "| steps: median, most | seeds from | date | doing nothing |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
-    for row in rows:
-        low, high = (100 * share for share in row["interval"])
-        median, most = row["median_steps"], row["most_steps"]
-        steps = "" if median is None else f"{median:.0f}, {most}"
-        lines.append(
-            f"| {row['benchmark']} | {row['robots']} | {row['controller']} "
-            f"| {row['successes']} of {row['episodes']} | {low:.0f} to {high:.0f} % "
-            f"| {steps} | {row['base']} | {row['date']} |"
-        )
+    for key in experts | idle:
+        row, still = experts.get(key), idle.get(key)
+        cells = [*key, "", "", "", "", ""]
+        if row is not None:
+            low, high = (100 * share for share in row["interval"])
+            median, most = row["median_steps"], row["most_steps"]
+            cells[3] = f"{row['successes']} of {row['episodes']}"
+            cells[4] = f"{low:.0f} to {high:.0f} %"
+            cells[5] = "" if median is None else f"{median:.0f}, {most}"
+            cells[6:] = str(row["base"]), row["date"]
+        cells.append(f"{still['successes']} of {still['episodes']}" if still else "")
+        lines.append(f"| {' | '.join(cells)} |")
     machines = ", ".join(sorted({row["machine"] for row in rows}))
     return "\n".join([*lines, "", f"Machine: {machines}."])
 
@@ -99,8 +119,7 @@ def write_page(rows: list[dict[str, Any]]) -> None:
 def add(row: dict[str, Any]) -> None:
     """Add a result to those known, in place of an earlier one of the same case."""
     known = json.loads(FOUND.read_text("utf-8")) if FOUND.exists() else []
-    key = ("benchmark", "robots", "controller")
-    others = [r for r in known if any(r[k] != row[k] for k in key)]
+    others = [other for other in known if case(other) != case(row)]
     FOUND.write_text(json.dumps([*others, row], indent=1), "utf-8")
 
 
@@ -108,8 +127,10 @@ def main() -> None:
     """Measure what the arguments name."""
     parser = options(__doc__, "three seeds of five benchmarks")
     parser.add_argument("benchmarks", nargs="*")
+    parser.add_argument("--policy", default="expert", choices=("expert", "hold"))
     parser.add_argument("--robots")
     parser.add_argument("--controller")
+    parser.add_argument("--horizon", type=int)
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--base", type=int, default=7000)
     parser.add_argument("--table", action="store_true", help="write docs/experts.md")
@@ -121,7 +142,8 @@ def main() -> None:
     count = 3 if given.quick else given.seeds
     for name in given.benchmarks or (ALL[:2] + ALL[8:11] if given.quick else ALL):
         seeds = range(given.base, given.base + count)
-        row = measure(name, given.robots, given.controller, seeds)
+        numbers = given.controller, seeds, given.horizon
+        row = measure(name, given.policy, given.robots, *numbers)
         if not given.quick:
             add(row)
         report.rows.append(row | {"case": name, "side": row["robots"]})

@@ -42,12 +42,12 @@ class LemonInBin(ObjectBenchmark):
         """Whether the released lemon is inside the bin."""
         x, y, z = self.states["lemon"].position - BIN
         inside = max(abs(x), abs(y)) < 0.1 and 0.0 < z < 0.08
-        return inside and not self.grasped("lemon")
+        return inside and not self.scene.grasped("lemon")
 
     def progress(self) -> float:
         """Return the shaped reward before success."""
         near = 1.0 - np.tanh(5.0 * self.distance(self.states["lemon"].position))
-        return 0.3 * near + 0.3 * self.grasped("lemon")
+        return 0.3 * near + 0.3 * self.scene.grasped("lemon")
 
 
 env = wbc_suite.make(LemonInBin, robots="UR5e", reward_shaping=True)

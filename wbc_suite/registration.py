@@ -37,7 +37,8 @@ GOALS = (
 """Benchmarks with an id `wbc_suite/{name}-Goal-v0` too; see `wrappers.Goals`."""
 
 _CHANGED = (
-    *("Door", "Lift", "NutAssembly", "PickPlace", "Stack", "Stand", "ToolHang"),
+    *("Carry", "Door", "Lift", "LocoLift", "NutAssembly", "PickPlace", "Stack"),
+    *("Stand", "ToolHang"),
     *("TwoArmHandover", "TwoArmLift", "TwoArmPegInHole", "TwoArmTransport", "Wipe"),
 )
 """Beginnings of the names whose reward, success or scene has changed: version 1."""

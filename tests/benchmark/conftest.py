@@ -23,6 +23,11 @@ def speeds(env):
     }
 
 
+def hand_touches(monkeypatch, task, name):
+    """Take what an object touches for a robot."""
+    monkeypatch.setattr(task.scene, "robot_geoms", task.scene.touched_by(name))
+
+
 def put(env, **poses):
     """Put things somewhere, (position, quat or None), and update the simulation."""
     for name, (position, quat) in poses.items():

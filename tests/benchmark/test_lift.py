@@ -48,7 +48,7 @@ def test_a_cube_that_flies_through_a_hand_is_not_lifted(env, speed, held):
     lift = grip_cube(env)
     env.simulation.data.joint("cube_joint").qvel[2] = speed
     mujoco.mj_forward(env.simulation.model, env.simulation.data)
-    assert lift.grasped("cube")
+    assert lift.scene.grasped("cube")
     assert lift.success() == held
 
 

@@ -22,7 +22,10 @@ def before_the_table(env):
 
 
 def grip(env, monkeypatch, held=True):
-    monkeypatch.setattr(env.benchmark.hands[0], "grasps", lambda geoms: held)
+    hand = env.benchmark.hands[0]
+    monkeypatch.setattr(hand, "grasps", lambda geoms: held)
+    monkeypatch.setattr(hand, "clamps", lambda geoms, angle: held)
+    monkeypatch.setattr(hand, "slip", lambda body: 0.0)
 
 
 def put_cube(env, z, velocity=(0.0, 0.0, 0.0)):
@@ -59,6 +62,19 @@ def test_near_misses_are_no_success(env, monkeypatch, z, velocity, held):
     assert not task.success()
     assert task.reward(shaped=False) == 0.0
     assert 0.0 < task.reward(shaped=True) < 1.0
+
+
+@pytest.mark.parametrize(("clamps", "slip"), [(False, 0.0), (True, 0.3)])
+def test_a_cube_that_two_links_touch_is_held_only_if_clamped(
+    env, monkeypatch, clamps, slip
+):
+    before_the_table(env)
+    grip(env, monkeypatch)
+    hand = env.benchmark.hands[0]
+    monkeypatch.setattr(hand, "clamps", lambda geoms, angle: clamps)
+    monkeypatch.setattr(hand, "slip", lambda body: slip)
+    put_cube(env, TOP + 0.1)
+    assert not count(env, 2 * HOLD).success()
 
 
 def test_a_cube_that_is_let_go_and_caught_counts_anew(env, monkeypatch):

@@ -12,7 +12,7 @@ from wbc_suite.benchmark import load_benchmark
 from wbc_suite.benchmark.arrangement import with_default
 from wbc_suite.benchmark.carry import Carry
 from wbc_suite.benchmark.falls import fall_of
-from wbc_suite.benchmark.object_benchmark import ObjectBenchmark
+from wbc_suite.benchmark.predicates import Predicates
 from wbc_suite.benchmark.reach import Reach
 from wbc_suite.benchmark.standing import arrange_on_feet
 from wbc_suite.benchmark.tool_hang import HOLE, ToolHang
@@ -129,7 +129,7 @@ def test_marks_that_were_wiped_stay_wiped():
         marks=marks,
         wiped=np.array([False, True, False]),
         wipe=lambda now: wiped.append(list(now)),
-        _contacts=lambda: (points, config.reward.least_force, False),
+        _contacts=lambda: ([np.array(points)], config.reward.least_force, False),
         _measures=np.zeros(9),
     )
     Wipe.after_step(task)
@@ -138,7 +138,11 @@ def test_marks_that_were_wiped_stay_wiped():
     task.wiped = np.array([True, True, False])
     Wipe.after_step(task)
     assert len(wiped) == 1  # nothing new
-    task._contacts = lambda: (points, 0.9 * config.reward.least_force, False)
+    task._contacts = lambda: (
+        [np.array(points)],
+        0.9 * config.reward.least_force,
+        False,
+    )
     task.wiped = np.array([False, True, False])
     Wipe.after_step(task)
     assert len(wiped) == 1  # too light
@@ -173,7 +177,7 @@ def test_a_hole_of_the_wrench_is_on_the_arm_of_the_frame(hole, passes, shift):
 def test_an_object_is_held_where_it_moves_with_the_hand(clamps, slip, holds):
     task = stub(states={"cube": stub(body=4)}, grip_angle=0.5)
     hand = stub(clamps=lambda geoms, angle: clamps, slip=lambda body: slip)
-    assert ObjectBenchmark.holds(task, hand, "cube", {1}) == holds
+    assert Predicates.holds(task, hand, "cube", {1}) == holds
 
 
 def furnished(name):
@@ -270,10 +274,10 @@ def test_hands_press_on_the_table_and_other_parts_collide_with_it(collided):
         data=data,
         hands=[stub(owns=lambda geom: geom == tip)],
         _table=model.geom("table").id,
-        _robot_geoms={tip, elbow},
+        scene=stub(robot_geoms={tip, elbow}),
         _wrench=np.zeros(6),
     )
-    points, force, found = Wipe._contacts(task)
+    (points,), force, found = Wipe._contacts(task)
     assert found == collided
     np.testing.assert_allclose(points, [[0.1, 0.2]], atol=1e-3)
     assert force == pytest.approx(9.81, rel=0.01)

@@ -1,3 +1,5 @@
+import math
+
 import mujoco
 import numpy as np
 import pytest
@@ -8,8 +10,8 @@ from wbc_suite.errors import PlacementError
 from wbc_suite.scene.placement import Region, UniformSampler
 
 TOP = 0.8
-B_AT = (0.1, 0.1, TOP + 0.025)
-ON_B = (0.1, 0.1, TOP + 0.05 + 0.02 - 1e-4)
+B_AT = (0.1, 0.1, TOP + 0.025 - 1e-4)
+ON_B = (0.1, 0.1, TOP + 0.05 + 0.02 - 2e-4)
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +53,42 @@ def test_near_misses_are_no_success(env, a, b):
     assert 0.0 <= stack.reward(shaped=True) < 1.0
 
 
+HALF = math.sqrt(0.5)
+TIPPED = [(HALF, HALF, 0, 0), (HALF, -HALF, 0, 0), (HALF, 0, HALF, 0), (0, 0, 0, 1)]
+"""B on a side, on the opposite one, on another, and on its top."""
+
+
+@pytest.mark.parametrize("tipped", TIPPED)
+@pytest.mark.parametrize("turn", range(4))
+def test_a_beside_a_tipped_b_is_not_on_it(env, tipped, turn):
+    env.reset(seed=0)
+    c, s = math.cos(turn * math.pi / 2), math.sin(turn * math.pi / 2)
+    beside = (0.1 + 0.0449 * c, 0.1 + 0.0449 * s, TOP + 0.02 - 1e-4)
+    stack = put(env, cubeB=(B_AT, tipped), cubeA=(beside, None))
+    assert stack.scene.touching("cubeA", "cubeB")
+    assert not stack.success()
+
+
+@pytest.mark.parametrize("tipped", TIPPED)
+def test_a_on_a_tipped_b_is_on_it(env, tipped):
+    env.reset(seed=0)
+    assert put(env, cubeB=(B_AT, tipped), cubeA=(ON_B, None)).success()
+
+
+@pytest.mark.parametrize(
+    ("aside", "turn"),
+    [((0.0, 0.027, 0.0), 0.0), ((0.0, 0.0, 0.00823), math.pi / 4 + 0.06)],
+    ids=["tips over the side", "on its edge"],
+)
+def test_a_that_will_tip_is_not_on_b(env, aside, turn):
+    env.reset(seed=0)
+    tipping = (math.cos(turn / 2), math.sin(turn / 2), 0.0, 0.0)
+    at = tuple(np.add(ON_B, aside))
+    stack = put(env, cubeB=(B_AT, None), cubeA=(at, tipping))
+    assert stack.scene.touching("cubeA", "cubeB")
+    assert not stack.success()
+
+
 def hold_between_fingers(env):
     """Put A between the fingers' pads and close them on it; B right below it."""
     data = env.simulation.data
@@ -67,8 +105,8 @@ def hold_between_fingers(env):
 
 def test_a_held_on_b_is_no_success(env):
     stack = hold_between_fingers(env)
-    assert stack.touching("cubeA", "cubeB")
-    assert stack.grasped("cubeA")
+    assert stack.scene.touching("cubeA", "cubeB")
+    assert stack.scene.grasped("cubeA")
     assert not stack.success()
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from conftest import penetration, put
-from posing import act_at_random
+from posing import DOWN, act_at_random, fingers, reach
 
 import wbc_suite
 
@@ -23,8 +23,14 @@ def lie(env, payload, trash, lifted=0.0):
     return put(env, payload=(at, LYING), trash=(cube, None))
 
 
+def settle(env):
+    for _ in range(5):
+        env.step(env.hold_action)
+
+
 def test_both_in_their_bins_is_a_success(env):
     task = lie(env, TARGET, THROWN)
+    settle(env)
     assert task.success()
     assert task.reward(shaped=False) == task.reward(shaped=True) == 1.0
 
@@ -34,6 +40,17 @@ def test_it_stays_a_success(env):
     for _ in range(10):
         env.step(env.hold_action)
     assert task.success()
+
+
+def test_trash_that_a_hand_grasps_in_its_bin_is_no_success(env):
+    task = lie(env, TARGET, THROWN)
+    settle(env)
+    reach(env, 1, np.array([*THROWN, FLOOR + 0.025]), DOWN)
+    fingers(env, 1, 0.04)
+    assert task.success()
+    fingers(env, 1, 0.0195)
+    assert task.scene.grasped("trash")
+    assert not task.success()
 
 
 @pytest.mark.parametrize(
@@ -70,8 +87,8 @@ def test_it_starts_closed_with_the_keys_of_datasets(env):
         assert penetration(env) < 5e-4
         for _ in range(5):
             env.step(env.hold_action)
-        assert env.benchmark.inside("payload", "start_bin")
-        assert env.benchmark.inside("trash", "target_bin")
+        assert env.benchmark.is_in("payload", "start_bin")
+        assert env.benchmark.is_in("trash", "target_bin")
         assert seen["lid_handle_pos"][2] > 0.95
         assert (seen["payload_in_target_bin"], seen["trash_in_trash_bin"]) == (0, 0)
     assert seen["object-state"].shape == (41,)

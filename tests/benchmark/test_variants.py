@@ -1,7 +1,7 @@
 """Every variant of a benchmark: one success and five near misses, set by hand."""
 
 import pytest
-from conftest import put
+from conftest import hand_touches, put
 
 import wbc_suite
 from wbc_suite.benchmark.pick_place import GROCERIES, REST
@@ -34,7 +34,7 @@ def check(env, thing, good, misses, monkeypatch):
     assert task.success()
     assert task.reward(shaped=False) == task.reward(shaped=True) == 1.0
     with monkeypatch.context() as held:
-        held.setattr(task.hands[0], "grasps", lambda geoms: True)
+        hand_touches(held, task, thing)
         assert not task.success()
     for place in misses:
         task = put(env, **{thing: (place, None)})

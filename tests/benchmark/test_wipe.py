@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from posing import DOWN, reach
 
 import wbc_suite
-from wbc_suite.benchmark.wipe import _distances
+from wbc_suite.benchmark.predicates import hull_distances
 
 TOP = 0.9
 
@@ -128,16 +129,30 @@ def test_another_part_on_the_table_is_a_collision(env):
     wipe.hands = hands
 
 
+def test_nothing_is_wiped_between_two_hands():
+    env = wbc_suite.make("Wipe", robots="Baxter")
+    env.reset(seed=0)
+    wipe = env.benchmark
+    for hand, y in enumerate((-0.33, 0.33)):
+        reach(env, hand, np.array([0.15, y, TOP - 0.001]), DOWN)
+    wipe.after_step()
+    assert wipe.force > 0.5
+    assert not wipe.wiped[np.abs(wipe.marks[:, 1]) < 0.2].any()
+    assert np.abs(wipe.marks[:, 1]).min() < 0.2
+
+
 def test_distances_to_a_hull():
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]])
     points = np.array([[0.5, 0.2], [1.5, 0.5], [2.0, 2.0], [-1.0, 0.0]])
     wanted = [0.0, 0.5, np.sqrt(2.0), 1.0]
-    np.testing.assert_allclose(_distances(square, points), wanted)
+    np.testing.assert_allclose(hull_distances(square, points), wanted)
     line = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.0]])
     np.testing.assert_allclose(
-        _distances(line, points), [0.2, np.hypot(0.5, 0.5), np.hypot(1, 2), 1.0]
+        hull_distances(line, points), [0.2, np.hypot(0.5, 0.5), np.hypot(1, 2), 1.0]
     )
-    np.testing.assert_allclose(_distances(line[:1], points[:1]), [np.hypot(0.5, 0.2)])
+    np.testing.assert_allclose(
+        hull_distances(line[:1], points[:1]), [np.hypot(0.5, 0.2)]
+    )
 
 
 def test_robots_wipe_with_a_pad_unless_told_otherwise():
@@ -167,7 +182,7 @@ def test_distances_to_a_random_hull_are_those_of_the_nearest_point_in_it():
         weights = rng.dirichlet(np.full(size, 0.3), 20_000)
         inside = weights @ hull
         nearest = [np.linalg.norm(inside - p, axis=1).min() for p in points]
-        found = _distances(hull, points)
+        found = hull_distances(hull, points)
         assert (found <= np.array(nearest) + 1e-9).all()
         np.testing.assert_allclose(found, nearest, atol=0.05)  # samples are 5 cm apart
 

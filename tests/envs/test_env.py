@@ -351,3 +351,40 @@ def test_an_episode_can_begin_at_a_recorded_place(env):
     np.testing.assert_array_equal(env.physics_state, twin.physics_state)
     with pytest.raises(ConfigError, match="A physics state has shape"):
         env.reset_to(recorded[:-1])
+
+
+@pytest.mark.parametrize("win", [1, 5, 10])
+@pytest.mark.parametrize("terminate", [True, False])
+def test_winning_earns_more_than_hovering(monkeypatch, win, terminate):
+    env = wbc_suite.make(
+        "Stack",
+        robots="Panda",
+        horizon=10,
+        reward_shaping=True,
+        reward_scale=2.0,
+        terminate_on_success=terminate,
+    )
+    monkeypatch.setattr(env.benchmark, "progress", lambda: 0.75)
+    returns = []
+    for first in (win, 100):
+        env.reset(seed=0)
+        step, over = 0, False
+        returns.append(0.0)
+        while not over:
+            step += 1
+            done = step >= first
+            monkeypatch.setattr(env.benchmark, "success", lambda done=done: done)
+            _, reward, terminated, truncated, _ = env.step(env.hold_action)
+            returns[-1] += reward
+            over = terminated or truncated
+        assert step == (win if terminate and first == win else 10)
+    won, hovered = returns
+    assert won == pytest.approx(2.0 * (0.75 * (win - 1) + (11 - win)))
+    assert won > hovered
+
+
+def test_a_sparse_reward_pays_once_for_a_success_that_ends_the_episode(monkeypatch):
+    env = wbc_suite.make("Stack", robots="Panda", terminate_on_success=True)
+    env.reset(seed=0)
+    monkeypatch.setattr(env.benchmark, "success", lambda: True)
+    assert env.step(env.hold_action)[1] == 1.0

@@ -23,7 +23,6 @@ from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene import TableConfig, add_camera, add_tables
 from wbc_suite.scene.objects import SceneObject, pot
 from wbc_suite.scene.placement import UniformSampler
-from wbc_suite.sensing.hands import pairs_in_contact
 from wbc_suite.sensing.reading import (
     Reading,
     body_position,
@@ -48,13 +47,11 @@ class CarryingConfig(FrozenModel):
         alone: Time for which a pot off the tables may lack a hand, s.
         tilt: Greatest tilt of the pot when it is put down, rad.
         margin: Least distance of the pot's middle from the table's edges, m.
-        speed: Greatest speed of the pot when it is put down, m/s.
     """
 
     alone: PositiveFloat
     tilt: PositiveFloat
     margin: PositiveFloat
-    speed: PositiveFloat
 
 
 class RewardConfig(FrozenModel):
@@ -147,8 +144,6 @@ class Carry(ObjectBenchmark):
         """Look up robot, pot, tables and floor."""
         super().bind(model, data, robots)
         self.standing.bind(model, data, robots[0])
-        first = int(model.joint(f"{POT}_joint").dofadr[0])
-        self._pot_velocity = data.qvel[first : first + 3]
         self._supports = {model.geom(name).id for name in (FROM, TO, FLOOR)}
         self._from, self._to = model.geom(FROM).id, model.geom(TO).id
         self._memory: Vector = data.userdata[self._entry : self._entry + MEMORY]
@@ -176,22 +171,13 @@ class Carry(ObjectBenchmark):
         """Whether the pot has been moved by two hands alone."""
         return not self._memory[SPOILED]
 
-    def touched_by_pot(self) -> set[int]:
-        """Return the geoms that the pot touches."""
-        own = self.states[POT].geoms
-        pairs = [
-            pair for pair in pairs_in_contact(self.data) if not own.isdisjoint(pair)
-        ]
-        return {geom for pair in pairs for geom in pair} - own
-
     def hands_at_pot(self) -> int:
         """Return how many hands touch the pot."""
-        touched = self.touched_by_pot()
-        return sum(any(hand.owns(geom) for geom in touched) for hand in self.hands)
+        return len(self.scene.hands_at(POT))
 
     def supports(self) -> set[int]:
         """Return which of the tops and the floor the pot touches, by their geoms."""
-        return self.touched_by_pot() & self._supports
+        return self.scene.touched_by(POT) & self._supports
 
     def after_step(self) -> None:
         """Note falls, how the pot is moved, and how long it has been put down."""
@@ -208,18 +194,16 @@ class Carry(ObjectBenchmark):
         self.standing.observe(down and self.standing.stands)
 
     def is_put_down(self) -> bool:
-        """Whether the pot stands still on the other table, and no robot touches it."""
+        """Whether the pot is at rest on the other table alone, and upright."""
         numbers, state = self.config.carrying, self.states[POT]
-        (x, y, _), (length, width, _) = self.config.other, self.config.table.size
-        aside = abs(state.position[0] - x), abs(state.position[1] - y)
-        inside = aside[0] < length / 2 - numbers.margin
-        inside = inside and aside[1] < width / 2 - numbers.margin
-        level = state.rotation[2, 2] > math.cos(numbers.tilt)
-        still = float(np.linalg.norm(self._pot_velocity)) < numbers.speed
-        free = not self.in_contact(state.geoms, self._robot_geoms)
-        return bool(inside and level and still and free) and self.supports() == {
-            self._to
-        }
+        aside = np.abs(state.position - self.config.other)[:2]
+        edges = np.array(self.config.table.size[:2]) / 2 - numbers.margin
+        inside = bool((aside < edges).all())
+        return (
+            inside
+            and self.scene.upright(POT, numbers.tilt)
+            and self.scene.on(POT, {self._to})
+        )
 
     def success(self) -> bool:
         """Whether the carried pot has stood on the other table, and the robot too."""

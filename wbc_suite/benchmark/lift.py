@@ -95,7 +95,7 @@ class Lift(ObjectBenchmark):
     def success(self) -> bool:
         """Whether a hand holds the cube, its middle `lift_height` above the table."""
         height = self.cube_position.item(2) - self.config.table.center[2]
-        return height > self.config.reward.lift_height and self.held(CUBE)
+        return height > self.config.reward.lift_height and self.scene.held(CUBE)
 
     def progress(self) -> float:
         """Return the shaped reward.
@@ -107,6 +107,6 @@ class Lift(ObjectBenchmark):
         numbers = self.config.reward
         distance = self.distance(self.cube_position)
         reward = 1.0 - math.tanh(numbers.reach_scale * distance)
-        if self.grasped(CUBE):
+        if self.scene.grasped(CUBE):
             reward += numbers.grasp
         return reward / numbers.success

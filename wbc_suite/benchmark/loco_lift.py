@@ -131,7 +131,7 @@ class LocoLift(ObjectBenchmark):
         numbers = self.config.reward
         slow = float(np.linalg.norm(self._cube_velocity)) < numbers.speed
         high = self.height > numbers.lift_height
-        held = high and slow and self.grasped(CUBE)
+        held = high and slow and self.scene.held(CUBE)
         self.standing.observe(held and self.standing.stands)
 
     def success(self) -> bool:
@@ -154,7 +154,7 @@ class LocoLift(ObjectBenchmark):
         numbers, d = self.config.reward, self.distance(self.states[CUBE].position)
         reward = numbers.approach * (1.0 - math.tanh(numbers.approach_scale * d))
         reward += numbers.reach * (1.0 - math.tanh(numbers.reach_scale * d))
-        if self.grasped(CUBE):
+        if self.scene.grasped(CUBE):
             share = min(max(self.height / numbers.lift_height, 0.0), 1.0)
             reward += numbers.grasp + numbers.lift * share
         return reward

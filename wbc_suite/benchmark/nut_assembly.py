@@ -10,6 +10,7 @@ from pydantic import Field, PositiveFloat
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.predicates import crossing
 from wbc_suite.benchmark.sorting import Sorting
 from wbc_suite.benchmark.staged_reward import StagedReward
 from wbc_suite.robot.shapes import Real, Size
@@ -21,6 +22,7 @@ from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import FrozenModel
 
 MAKERS = {"SquareNut": objects.square_nut, "RoundNut": objects.round_nut}
+UP = np.array([0.0, 0.0, 1.0])
 BROWN, GREY = (0.66, 0.44, 0.24, 1.0), (0.58, 0.60, 0.63, 1.0)
 
 Nut = Literal["SquareNut", "RoundNut"]
@@ -77,16 +79,23 @@ class NutAssembly(ObjectBenchmark):
             self,
             {name: self.goal(name) for name in config.nuts},
             within=lambda dx, dy: math.hypot(dx, dy) < config.aside,
+            placed=self._is_around_peg,
             grip=lambda name: self.site(f"{name}_handle"),
             floor=config.table.center[2],
-            **config.model_dump(include={"height", "lift_height", "pick_one"}),
+            **config.model_dump(include={"lift_height", "pick_one"}),
             stages=config.stages,
-            lies=self._is_flat,
         )
 
-    def _is_flat(self, name: str) -> bool:
-        upright = abs(self.states[name].rotation.item(2, 2))
-        return upright > math.cos(self.config.tilt)
+    def _is_around_peg(self, name: str) -> bool:
+        """Whether a nut is low and flat, and its peg's axis goes through its hole."""
+        state, config = self.states[name], self.config
+        foot = np.array([*self.goal(name), config.table.center[2]])
+        x, y, share = crossing(foot, foot + UP, state.position, state.rotation)
+        return (
+            math.hypot(x, y) < config.aside
+            and 0.0 < share < config.height
+            and self.scene.upright(name, config.tilt, flipped=True)
+        )
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table, pegs and cameras."""

@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import mujoco
@@ -17,6 +17,7 @@ from wbc_suite.benchmark.arrangement import (
     arrange_two_arms,
 )
 from wbc_suite.benchmark.falls import fall_of
+from wbc_suite.benchmark.predicates import GRIP_ANGLE, Predicates
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, PlacementError
 from wbc_suite.robot import RobotDescription
@@ -24,7 +25,7 @@ from wbc_suite.scene import ArenaConfig, Push
 from wbc_suite.scene.mjcf_arena import PREFIX
 from wbc_suite.scene.objects import ObjectState, SceneObject
 from wbc_suite.scene.placement import Placed, Sampler
-from wbc_suite.sensing.hands import Hand, hands_of, pairs_in_contact
+from wbc_suite.sensing.hands import hands_of
 from wbc_suite.sensing.reading import (
     Reading,
     body_position,
@@ -43,7 +44,6 @@ TRIES = 50
 """Placements that are drawn if a robot touches the objects of the first."""
 PRESSED = 1e-3  # depth from which an object is in the arena, and not on it, m
 PARKED = (8.0, 8.0)  # place of objects that are not used in an episode, m
-SLIP = 0.2  # m/s, between a hand and what it holds, at most
 BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 
@@ -87,12 +87,14 @@ class ObjectBenchmark(ABC):
         grasps: Where and how hands can hold each object, and the objects attached to
             it, by name, after `bind`.
         hands: The hands of all robots, after `bind`.
+        scene: What holds between things and hands now, after `bind`.
+        grip_angle: See `Predicates`.
     """
 
     robots: Sequence[str] = ("Panda",)
     gripper: str | None = None
     needs_gripper = True
-    grip_angle = math.radians(120.0)  # between the sides of a grip, at least
+    grip_angle = GRIP_ANGLE
     pushes: Sequence[Push] = ()
     sampler: Sampler | None
 
@@ -151,13 +153,16 @@ class ObjectBenchmark(ABC):
         self._sites: dict[str, Vector] = {}
         prefixes = tuple(state.prefix for state in robots)
         bodies = [model.body(int(b)).name for b in model.geom_bodyid]
-        self._robot_geoms = frozenset(
+        robot_geoms = frozenset(
             g for g, body in enumerate(bodies) if prefixes and body.startswith(prefixes)
         )
         self.hands = [hand for state in robots for hand in hands_of(state)]
         things = self.objects()
         self.states = {t.name: ObjectState(model, data, t.name) for t in things}
         self._own = tuple(self.states)
+        self.scene = Predicates(
+            data, self.states, self.hands, robot_geoms, grip_angle=self.grip_angle
+        )
         self._bind_arena()
         self.grasps = {t.name: t.grasps for thing in things for t in thing.family()}
 
@@ -209,7 +214,7 @@ class ObjectBenchmark(ABC):
         placed = frozenset[int]().union(*free)
         mujoco.mj_fwdPosition(self.model, self.data)
         deep = self.data.contact.geom[self.data.contact.dist < -PRESSED].tolist()
-        return self.in_contact(placed, self._robot_geoms) or any(
+        return self.scene.in_contact(placed, self.scene.robot_geoms) or any(
             (a in placed and b in self._arena_geoms)
             or (b in placed and a in self._arena_geoms)
             for a, b in deep
@@ -306,38 +311,3 @@ class ObjectBenchmark(ABC):
         if name not in self._sites:
             self._sites[name] = self.data.site_xpos[self.model.site(name).id]
         return self._sites[name]
-
-    def grasped(self, name: str) -> bool:
-        """Whether two links of one gripper touch an object."""
-        geoms = self.states[name].geoms
-        return any(hand.grasps(geoms) for hand in self.hands)
-
-    def held(self, name: str) -> bool:
-        """Whether a hand clamps an object, which moves with it."""
-        geoms = self.states[name].geoms
-        return any(self.holds(hand, name, geoms) for hand in self.hands)
-
-    def holds(self, hand: Hand, name: str, geoms: Collection[int]) -> bool:
-        """Whether a hand clamps geoms of an object, which moves with it."""
-        body = self.states[name].body
-        return hand.clamps(geoms, self.grip_angle) and hand.slip(body) < SLIP
-
-    def rests(self, name: str) -> bool:
-        """Whether an object lies still on something that is no robot."""
-        state = self.states[name]
-        return state.is_still and any(
-            len(state.geoms.intersection(pair)) == 1
-            and self._robot_geoms.isdisjoint(pair)
-            for pair in pairs_in_contact(self.data)
-        )
-
-    def touching(self, first: str, second: str) -> bool:
-        """Whether two objects touch."""
-        return self.in_contact(self.states[first].geoms, self.states[second].geoms)
-
-    def in_contact(self, first: Collection[int], second: Collection[int]) -> bool:
-        """Whether a geom of the first collection touches one of the second."""
-        return any(
-            (a in first and b in second) or (a in second and b in first)
-            for a, b in pairs_in_contact(self.data)
-        )

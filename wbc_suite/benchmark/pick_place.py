@@ -26,8 +26,6 @@ MAKERS = {
 GROCERIES = tuple(MAKERS)
 QUADRANTS = {"Milk": (-1, -1), "Bread": (1, -1), "Cereal": (-1, 1), "Can": (1, 1)}
 """Quadrant of each object in the second bin, by the signs of x and y."""
-ON_FLOOR = 0.01
-"""Greatest height of the lowest point of a placed object above the floor, m."""
 REST = {"Milk": 0.065, "Bread": 0.022, "Cereal": 0.060, "Can": 0.0425}
 """Height of the origin of each object at rest, m."""
 
@@ -41,7 +39,6 @@ class PickPlaceConfig(ObjectBenchmarkConfig):
         pick_one: Whether each episode has one of the objects, drawn at reset.
         target: The bin with the quadrants.
         region: Region of the `source` bin where objects start.
-        height: Largest height of a placed object above the floor of its bin, m.
         lift_height: Height to which lifting is rewarded, above the target bin, m.
     """
 
@@ -50,7 +47,6 @@ class PickPlaceConfig(ObjectBenchmarkConfig):
     source: BinConfig
     target: BinConfig
     region: Region
-    height: PositiveFloat
     lift_height: PositiveFloat
     stages: StagedReward
 
@@ -71,10 +67,10 @@ class PickPlace(ObjectBenchmark):
             self,
             {name: self.goal(name) for name in config.objects},
             within=lambda dx, dy: abs(dx) < length / 4 and abs(dy) < width / 4,
+            placed=self._is_in_quadrant,
             grip=lambda name: self.states[name].position,
-            lies=self._is_on_floor,
             floor=config.target.center[2],
-            **config.model_dump(include={"height", "lift_height", "pick_one"}),
+            **config.model_dump(include={"lift_height", "pick_one"}),
             stages=config.stages,
         )
 
@@ -112,12 +108,10 @@ class PickPlace(ObjectBenchmark):
         side, end = QUADRANTS[name]
         return x + side * length / 4, y + end * width / 4
 
-    def _is_on_floor(self, name: str) -> bool:
-        """Whether an object reaches down to the floor of its bin, not over a wall."""
-        state = self.states[name]
-        w, x, y, z = self.data.xquat[state.body].tolist()
-        low = state.position.item(2) - state.extent((w, x, y, z)).bottom
-        return low < self.config.target.center[2] + ON_FLOOR
+    def _is_in_quadrant(self, name: str) -> bool:
+        length, width, _ = self.config.target.size
+        floor = *self.goal(name), self.config.target.center[2]
+        return self.scene.inside(name, floor, (length / 2, width / 2))
 
     def success(self) -> bool:
         """Whether each object lies in its quadrant; see `Sorting`."""

@@ -18,13 +18,12 @@ class Sorting:
         benchmark: The benchmark.
         goals: Middle of each object's place, x y, m.
         within: Whether an offset x y from the middle, m, is inside of a place.
+        placed: Whether an object is at its place, moving or not.
         grip: Returns the point of an object that hands reach for, in the world, m.
         floor: Height of the places, m.
-        height: Largest height of a placed object above the floor, m.
         lift_height: Height to which lifting is rewarded, above the floor, m.
         pick_one: Whether each episode has one of the objects, drawn at reset.
         stages: Staged reward of each object.
-        lies: Whether an object lies as it should; any way by default.
 
     Attributes:
         active: The objects of this episode.
@@ -37,18 +36,17 @@ class Sorting:
         goals: Mapping[str, tuple[float, float]],
         *,
         within: Callable[[float, float], bool],
+        placed: Callable[[str], bool],
         grip: Callable[[str], Vector],
         floor: float,
-        height: float,
         lift_height: float,
         pick_one: bool,
         stages: StagedReward,
-        lies: Callable[[str], bool] = lambda name: True,
     ) -> None:
         self._benchmark, self._goals, self._names = benchmark, goals, tuple(goals)
-        self._within, self._grip, self._floor = within, grip, floor
-        self._height, self._lift_height = height, lift_height
-        self._pick_one, self._stages, self._lies = pick_one, stages, lies
+        self._within, self._placed, self._grip = within, placed, grip
+        self._floor, self._lift_height = floor, lift_height
+        self._pick_one, self._stages = pick_one, stages
         self.active, self.number = self._names, 0
 
     def draw(self, rng: np.random.Generator) -> list[str]:
@@ -75,15 +73,11 @@ class Sorting:
         return readings | {"obj_id": computed(1, lambda: self.number)}
 
     def is_placed(self, name: str) -> bool:
-        """Whether an object lies still at its place, no hand near it or grasping it."""
-        dx, dy, above = self._offset(name)
+        """Whether an object is at rest at its place, and no hand is near."""
         return (
-            0.0 < above < self._height
-            and self._within(dx, dy)
-            and self._lies(name)
+            self._placed(name)
             and self._stages.has_left(self._benchmark.distance(self._grip(name)))
-            and not self._benchmark.grasped(name)
-            and self._benchmark.rests(name)
+            and self._benchmark.scene.at_rest(name)
         )
 
     def success(self) -> bool:
@@ -104,7 +98,7 @@ class Sorting:
         dx, dy, above = self._offset(name)
         return self._stages.value(
             distance=self._benchmark.distance(self._grip(name)),
-            grasped=self._benchmark.grasped(name),
+            grasped=self._benchmark.scene.grasped(name),
             missing=max(self._lift_height - above, 0.0),
             aside=math.hypot(dx, dy),
             over=self._within(dx, dy),

@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 
 import mujoco
-import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.base import Source, load_config
@@ -18,8 +17,6 @@ from wbc_suite.sensing.reading import Reading, body_position, offset
 from wbc_suite.tomlfile import FrozenModel
 
 A, B = "cubeA", "cubeB"
-FLAT = 0.05
-"""rad, between faces of cubes that lie flat on another, at most."""
 
 
 class BlockConfig(FrozenModel):
@@ -84,14 +81,8 @@ class Stack(ObjectBenchmark):
         return {**self.poses_of([A, B]), "cubeA_to_cubeB": offset(b, a)}
 
     def success(self) -> bool:
-        """Whether A lies flat and still on the top of B, and no hand holds it."""
-        a, b, half = self.states[A], self.states[B], self.config.cube_b.half_size
-        up = b.rotation[:, 2]
-        x, y, z = ((a.position - b.position) @ b.rotation).tolist()
-        over = max(abs(x), abs(y)) < half < z
-        flat = float(np.abs(up @ a.rotation).max()) > math.cos(FLAT)
-        rests = a.is_still and self.touching(A, B)
-        return over and flat and rests and not self.grasped(A)
+        """Whether A is on B alone, which is at rest too."""
+        return self.scene.on(A, self.states[B].geoms) and self.scene.at_rest(B)
 
     def progress(self) -> float:
         """Return the shaped reward.
@@ -104,7 +95,7 @@ class Stack(ObjectBenchmark):
         """
         numbers, a = self.config.reward, self.states[A].position.tolist()
         near = 1.0 - math.tanh(numbers.reach_scale * self.distance(a))
-        reward = numbers.reach * near + numbers.grasp * self.grasped(A)
+        reward = numbers.reach * near + numbers.grasp * self.scene.grasped(A)
         lowest = self.config.table.center[2] + numbers.lift_height
         if a[2] > lowest + self.config.cube_a.half_size:
             b = self.states[B].position.tolist()

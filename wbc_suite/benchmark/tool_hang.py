@@ -9,6 +9,7 @@ from pydantic import PositiveFloat
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.predicates import crossing
 from wbc_suite.benchmark.staged_reward import StagedReward
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene import TableConfig, add_camera, add_table, add_table_cameras
@@ -96,45 +97,35 @@ class ToolHang(ObjectBenchmark):
 
     def is_inserted(self) -> bool:
         """Whether the frame is upright in the socket, down to its floor."""
-        upright = self.states[FRAME].rotation.item(2, 2)
-        if upright <= math.cos(self.config.inserted.tilt):
-            return False
         tip, floor = self.site(f"{FRAME}_tip"), self.site(f"{STAND}_floor")
         x, y, z = (tip - floor).tolist()
-        within = max(abs(x), abs(y)) < SOCKET
-        return within and -0.005 < z < self.config.inserted.depth
+        bounds = self.config.inserted
+        within = max(abs(x), abs(y)) < SOCKET and -0.005 < z < bounds.depth
+        return within and self.scene.upright(FRAME, bounds.tilt)
 
     def is_hanging(self) -> bool:
         """Whether the wrench hangs on the arm of the frame.
 
-        It lies still, touches the frame and not the stand, no hand holds it, it is
-        above the table, and the arm passes through one of its holes.
+        It is at rest on the frame alone, above the table, and the arm passes through
+        one of its holes.
         """
         holes = [self.site(f"{TOOL}_hole{k}") for k in (1, 2)]
         lowest = min(hole.item(2) for hole in holes)
         return (
             lowest > self.config.table.center[2] + self.config.clear
             and any(map(self._passes, holes))
-            and self.touching(TOOL, FRAME)
-            and not self.touching(TOOL, STAND)
-            and not self.grasped(TOOL)
-            and self.states[TOOL].is_still
+            and self.scene.on(TOOL, self.states[FRAME].geoms)
         )
 
     def _passes(self, hole: np.ndarray) -> bool:
         """Whether the arm of the frame goes through a hole of the wrench."""
         start, end = self.site(f"{FRAME}_corner"), self.site(f"{FRAME}_bend")
-        axis = self.states[TOOL].rotation[:, 2]
-        along = float(axis @ (end - start))
-        if abs(along) < 1e-6:
-            return False
-        t = float(axis @ (hole - start)) / along
-        gap = float(np.linalg.norm(start + t * (end - start) - hole))
-        return 0.0 < t < 1.0 and gap < HOLE
+        x, y, share = crossing(start, end, hole, self.states[TOOL].rotation)
+        return 0.0 < share < 1.0 and math.hypot(x, y) < HOLE
 
     def success(self) -> bool:
-        """Whether the frame is inserted and the wrench hangs on it."""
-        return self.is_inserted() and self.is_hanging()
+        """Whether the frame is at rest in the socket and the wrench hangs on it."""
+        return self.is_inserted() and self.is_hanging() and self.scene.at_rest(FRAME)
 
     def progress(self) -> float:
         """Return the shaped reward.
@@ -153,7 +144,7 @@ class ToolHang(ObjectBenchmark):
         aside = math.hypot(at[0] - goal[0], at[1] - goal[1])
         return self.config.stages.value(
             distance=self.distance(self.site(f"{name}_grip")),
-            grasped=self.grasped(name),
+            grasped=self.scene.grasped(name),
             missing=max(goal[2] - at[2], 0.0),
             aside=aside,
             over=aside < SOCKET,

@@ -145,12 +145,12 @@ class TwoArmHandover(ObjectBenchmark):
     @property
     def held_by_first(self) -> bool:
         """Whether arm 0 holds the hammer anywhere."""
-        return self.holds(self.hands[0], HAMMER, self.states[HAMMER].geoms)
+        return self.scene.holds(self.hands[0], HAMMER, self.states[HAMMER].geoms)
 
     @property
     def held_by_second(self) -> bool:
         """Whether arm 1 holds the handle."""
-        return self.holds(self.hands[1], HAMMER, self._handle)
+        return self.scene.holds(self.hands[1], HAMMER, self._handle)
 
     def observables(self) -> dict[str, Reading]:
         """Return the pose of the hammer, its handle, and its offset from each hand."""
@@ -163,9 +163,9 @@ class TwoArmHandover(ObjectBenchmark):
         }
 
     def success(self) -> bool:
-        """Whether arm 1 alone holds the handle in the air, after a handover."""
-        over = self.handed and self.raised
-        return over and self.held_by_second and not self.held_by_first
+        """Whether arm 1 holds the handle in the air, touched by no other hand."""
+        alone = self.scene.hands_at(HAMMER) == [self.hands[1]]
+        return self.handed and self.raised and alone and self.held_by_second
 
     def progress(self) -> float:
         """Return the shaped reward.

@@ -125,8 +125,7 @@ class TwoArmLift(ObjectBenchmark):
     @property
     def level(self) -> bool:
         """Whether the pot's axis is tilted less than `tilt`."""
-        upward = float(self.states[POT].rotation[2, 2])
-        return upward > math.cos(self.config.reward.tilt)
+        return self.scene.upright(POT, self.config.reward.tilt)
 
     def success(self) -> bool:
         """Whether the pot is level, above `lift_height`, and clamped by both hands."""
@@ -134,7 +133,7 @@ class TwoArmLift(ObjectBenchmark):
         return (
             self.height > self.config.reward.lift_height
             and self.level
-            and all(self.holds(hand, POT, geoms) for hand in self.hands)
+            and all(self.scene.holds(hand, POT, geoms) for hand in self.hands)
         )
 
     def progress(self) -> float:

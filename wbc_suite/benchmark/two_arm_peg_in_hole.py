@@ -11,6 +11,7 @@ from pydantic import Field, PositiveFloat, model_validator
 from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.predicates import crossing
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Rgba
@@ -187,14 +188,8 @@ class TwoArmPegInHole(ObjectBenchmark):
         parallel to the plate.
         """
         peg, plate = self.states[PEG], self.states[PLATE]
-        axis, normal = peg.rotation[:, 2], plate.rotation[:, 2]
-        along = float(axis @ normal)
-        if abs(along) < 1e-6:
-            return math.inf, math.inf, math.inf
-        depth = float((plate.position - peg.position) @ normal) / along
-        point = peg.position + depth * axis - plate.position
-        x, y, _ = (point @ plate.rotation).tolist()
-        return x, y, depth
+        start, end = peg.position, peg.position + peg.rotation[:, 2]
+        return crossing(start, end, plate.position, plate.rotation)
 
     def success(self) -> bool:
         """Whether the peg goes through the hole, nearly along the plate's normal."""

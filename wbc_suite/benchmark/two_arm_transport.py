@@ -11,7 +11,6 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
-from wbc_suite.control import RobotState
 from wbc_suite.robot.elements import Rgba
 from wbc_suite.robot.shapes import Size, Vector3
 from wbc_suite.scene import TableConfig, add_table_cameras, add_tables
@@ -167,13 +166,6 @@ class TwoArmTransport(ObjectBenchmark):
         glass = [replace(w, color=GLASS, material="plastic") for w in walls]
         return SceneObject(name=name, parts=(floor, *glass)).fixed(at)
 
-    def bind(
-        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
-    ) -> None:
-        """Look up the bins' floors too, which are their first parts."""
-        super().bind(model, data, robots)
-        self._floors = {n: model.geom(f"{n}_0").id for n in self._bin_places()}
-
     def observables(self) -> dict[str, Reading]:
         """Return poses, offsets from the hands, and which objects are in their bins."""
         readings = self.world_poses_of({"payload": PAYLOAD, "trash": TRASH})
@@ -194,19 +186,16 @@ class TwoArmTransport(ObjectBenchmark):
         }
 
     def _is_done(self, name: str) -> bool:
-        return self.inside(name, GOALS[name])
+        return self.is_in(name, GOALS[name])
 
-    def inside(self, name: str, where: str) -> bool:
-        """Whether an object touches a bin's floor, its middle between the walls."""
-        item, bin_ = self.states[name], self.states[where]
-        x, y, z = (item.position - bin_.position).tolist()
-        length, width, height = self.config.bin.size
-        between = abs(x) < length / 2 and abs(y) < width / 2 and 0.0 < z < height
-        return between and self.in_contact({self._floors[where]}, item.geoms)
+    def is_in(self, name: str, where: str) -> bool:
+        """Whether an object is down in a bin."""
+        floor = _above(self.states[where].position.tolist(), self.config.bin.wall)
+        return self.scene.inside(name, floor, self.config.bin.size)
 
     def success(self) -> bool:
-        """Whether the payload lies still in the target bin, the trash in its own."""
-        return all(self._is_done(n) and self.states[n].is_still for n in GOALS)
+        """Whether the payload is at rest in the target bin, the trash in its own."""
+        return all(self._is_done(name) and self.scene.at_rest(name) for name in GOALS)
 
     def progress(self) -> float:
         """Return the shaped reward, which robosuite does not have.

@@ -10,6 +10,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.predicates import hull_distances
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot.elements import Channel
@@ -77,7 +78,7 @@ class WipeConfig(ObjectBenchmarkConfig):
 class Wipe(ObjectBenchmark):
     """All marks of a random stroke are to be wiped off, by pressing on them.
 
-    The hands wipe the convex hull of their contact points with the table. A pad that
+    Each hand wipes the convex hull of its contact points with the table. A pad that
     lies flat wipes its whole face, a tilted one its edge, a finger next to nothing.
     Which marks are wiped is kept in `data.userdata`.
 
@@ -175,13 +176,14 @@ class Wipe(ObjectBenchmark):
 
     def after_step(self) -> None:
         """Wipe off the marks that the hands press on now."""
-        points, self.force, self.collided = self._contacts()
+        faces, self.force, self.collided = self._contacts()
         self._newly_wiped = 0
         presses = self.force >= self.config.reward.least_force
         self._measures[PRESSES] = presses
         if not presses:
             return
-        near = _distances(np.array(points), self.marks[:, :2]) <= self.config.margin
+        at, margin = self.marks[:, :2], self.config.margin
+        near = np.any([hull_distances(face, at) <= margin for face in faces], axis=0)
         before = self.wiped
         self._newly_wiped = int((near & ~before).sum())
         if self._newly_wiped:
@@ -191,20 +193,24 @@ class Wipe(ObjectBenchmark):
         """Draw the marks that are left in a saved state."""
         self.wipe(self.wiped)
 
-    def _contacts(self) -> tuple[list[Vector], float, bool]:
-        """Return contact points of hands and table, (2,) each, force and collision."""
-        points: list[Vector] = []
+    def _contacts(self) -> tuple[list[Matrix], float, bool]:
+        """Return each hand's contact points with the table, force and collision.
+
+        Points have shape (n, 2), n > 0.
+        """
+        points: list[list[Vector]] = [[] for _ in self.hands]
         force, collided = 0.0, False
         for i, (a, b) in enumerate(pairs_in_contact(self.data)):
             if self._table not in (a, b):
                 continue
-            if any(hand.owns(a) or hand.owns(b) for hand in self.hands):
+            owners = [k for k, h in enumerate(self.hands) if h.owns(a) or h.owns(b)]
+            for owner in owners:
                 mujoco.mj_contactForce(self.model, self.data, i, self._wrench)
                 force += abs(self._wrench.item(0))
-                points.append(self.data.contact.pos[i, :2])
-            elif not self._robot_geoms.isdisjoint((a, b)):
+                points[owner].append(self.data.contact.pos[i, :2])
+            if not owners and not self.scene.robot_geoms.isdisjoint((a, b)):
                 collided = True
-        return points, force, collided
+        return [np.array(face) for face in points if face], force, collided
 
     def wipe(self, wiped: ArrayLike) -> None:
         """Set which marks are wiped off, shape (n,); measure and draw the others."""
@@ -284,27 +290,3 @@ class Wipe(ObjectBenchmark):
         most += self.horizon * (numbers.contact + numbers.complete)
         reward = max(float(reward * self.horizon / most), 0.0)
         return reward / (1.0 + reward)
-
-
-def _distances(hull: Matrix, points: Matrix) -> Vector:
-    """Return the distances of points to the convex hull of others, 0 inside, (n,).
-
-    The points, shape (n, 2), and those that span the hull, shape (k, 2), are in one
-    plane.
-    """
-    if len(hull) == 1:
-        return np.linalg.norm(points - hull[0], axis=1)
-    i, k = np.triu_indices(len(hull), 1)  # all pairs: edges and diagonals
-    start, edge = hull[i], hull[k] - hull[i]
-    along = points[:, None] - start
-    squares = np.maximum(np.sum(edge * edge, axis=1), 1e-18)
-    t = np.clip(np.sum(along * edge, axis=2) / squares, 0.0, 1.0)
-    gaps = np.linalg.norm(along - t[..., None] * edge, axis=2).min(axis=1)
-    normal = np.column_stack([-edge[:, 1], edge[:, 0]])
-    height = np.sum(along * normal, axis=2)
-    side = np.sum((hull[:, None] - start) * normal, axis=2)
-    if np.ptp(side, axis=0).max() < 1e-12:
-        return gaps  # all points of the hull on one line
-    left, right = side.min(axis=0) > -1e-12, side.max(axis=0) < 1e-12
-    inside = ((height >= 0.0) | ~left) & ((height <= 0.0) | ~right)
-    return np.where(inside.all(axis=1), 0.0, gaps)

@@ -130,7 +130,9 @@ class EnvConfig(FrozenModel):
             of 20 actions a second, and of the same duration at other rates.
         reward_shaping: Whether the reward is shaped, or given for success only.
         reward_scale: Factor on the reward.
-        terminate_on_success: Whether success ends the episode.
+        terminate_on_success: Whether success ends the episode. A shaped reward pays
+            then for the steps that remain to the horizon too, 1 for each, so that
+            winning earns more than waiting next to the goal.
         use_object_obs: Whether objects are observed.
         randomisation: A `wbc_suite.randomisation.Randomisation`, drawn at each reset.
         use_sensor_obs: Whether robots' sensors are observed: joint torques, wrists,

@@ -176,6 +176,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         )
         info = self._info(clipped, success)
         terminated = self.config.terminate_on_success and success
+        if terminated and self.config.reward_shaping:  # else hovering would pay more
+            reward *= 1 + max(self.horizon - self._steps, 0)
         failure = self.benchmark.failure()
         if failure is not None:
             info["failure"], terminated = failure, True

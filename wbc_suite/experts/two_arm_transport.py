@@ -69,7 +69,7 @@ def _clear(cell: Workcell[TwoArmTransport], arm: Arm, clear: float) -> Steps[Non
             return
         floor = _floor(cell, TRASH_BIN)
         yield from put_down(cell, arm, TRASH, floor + DROP * UP, over=clear)
-        if cell.benchmark.inside(TRASH, TRASH_BIN):
+        if cell.benchmark.is_in(TRASH, TRASH_BIN):
             break
     yield from travel(arm, arm.home, height=_over(cell), tolerance=0.05, most=40)
 

@@ -125,7 +125,7 @@ class Workcell(Generic[B]):
 
     def touching(self, name: str, other: str) -> bool:
         """Whether two objects touch."""
-        return self.benchmark.touching(name, other)
+        return self.benchmark.scene.touching(name, other)
 
     def overlap(
         self,
