@@ -307,3 +307,57 @@ def test_a_user_without_home_has_a_cache(run, tmp_path):
     folder, hits = run(command, **environment)
     assert hits == 1
     assert folder.is_relative_to(tmp_path) or not command
+
+
+SHARED = """
+import sys, time
+import numpy as np
+from wbc_suite import kernel_cache
+from wbc_suite.compiling import compiled
+
+@compiled
+def first(x):
+    return 2.0 * x
+
+{kernels}
+
+print("ready", flush=True)
+sys.stdin.readline()
+first(2.0)
+found = [kernel(np.ones(3)) for kernel in KERNELS]
+print(sum(sum(kernel.stats.cache_misses.values()) for kernel in KERNELS))
+"""
+MANY = "\n".join(
+    f"@compiled\ndef kernel_{k}(x):\n    return np.sort(x + {k}).cumsum()\n"
+    for k in range(6)
+)
+
+
+@pytest.mark.slow
+def test_processes_that_start_at_once_compile_each_kernel_once(tmp_path):
+    """All but the first, by which each learns that it has to compile."""
+    root = Path(kernel_cache.__file__).parent.parent
+    kernels = f"{MANY}\nKERNELS = [{', '.join(f'kernel_{k}' for k in range(6))}]"
+    (tmp_path / "shared_kernels.py").write_text(SHARED.format(kernels=kernels))
+    environment = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONPATH": f"{root}{os.pathsep}{tmp_path}",
+    }
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", "import shared_kernels"],
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(3)
+    ]
+    for process in started:
+        assert process.stdout.readline() == "ready\n"
+    for process in started:
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    misses = [int(process.communicate()[0]) for process in started]
+    assert sum(misses) == 6

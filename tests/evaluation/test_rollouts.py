@@ -11,6 +11,7 @@ from wbc_suite.evaluation import (
     run_rollouts,
 )
 from wbc_suite.evaluation.results import collect
+from wbc_suite.evaluation.rollouts import prepare_rollouts
 from wbc_suite.executors import Outcome, Processes, Serial, run_items
 from wbc_suite.recording import Dataset
 
@@ -54,12 +55,37 @@ def test_processes_play_the_same_episodes_as_this_one(tmp_path):
     items = plan_rollouts([CASE], seeds=range(4), chunk=2)
     here = run_items(run_rollouts, items, folder=tmp_path / "a", executor=Serial())
     there = run_items(run_rollouts, items, folder=tmp_path / "b", executor=Processes(2))
-    assert [o.error for o in here + there] == [None] * 4
+    forked = Processes(1, prepare=prepare_rollouts)
+    again = run_items(run_rollouts, items, folder=tmp_path / "c", executor=forked)
+    assert [o.error for o in here + there + again] == [None] * 6
     lines = without_time(here)
-    assert without_time(there) == lines
+    assert without_time(there) == without_time(again) == lines
     assert [line["steps"] for line in lines] == [5] * 4
     assert [line["seed"] for line in lines] == [0, 1, 2, 3]
     assert all(line["max_reward"] <= line["return"] for line in lines)
+
+
+SEEN = []
+"""Environments of this process."""
+
+
+def in_one_environment(env, rng):
+    """Hold, but not in a second environment."""
+    if not any(env is one for one in SEEN):
+        SEEN.append(env)
+    if len(SEEN) > 1:
+        raise RuntimeError("This is another environment.")
+    return lambda observation: env.hold_action
+
+
+@pytest.mark.slow
+def test_a_worker_makes_one_environment_for_all_items_of_a_case(tmp_path):
+    policy = {"policy": f"{__name__}:in_one_environment"}
+    case = Case(**{**_fields(CASE), **policy})
+    items = plan_rollouts([case], seeds=range(4), chunk=1)
+    outcomes = run_items(run_rollouts, items, folder=tmp_path, executor=Processes(1))
+    errors = [e["error"] for o in outcomes for e in o.result["episodes"]]
+    assert errors == [None] * 4
 
 
 @pytest.mark.slow

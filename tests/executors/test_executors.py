@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import sys
 
 import pytest
 
@@ -114,6 +115,48 @@ def test_errors_are_told_and_tried_again_next_time(tmp_path):
     outcomes = run_items(doubled, items(), folder=tmp_path, executor=Serial())
     assert [o.error for o in outcomes] == [None] * 4
     assert calls(tmp_path) == list("abcd")
+
+
+MADE = []
+"""What `prepare` makes in this process."""
+
+
+def make(item):
+    MADE.append(item.name)
+
+
+def made(item, folder):
+    return {"made": list(MADE), "parent": os.getppid()}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="macOS cannot fork its libraries")
+def test_prepared_workers_have_what_this_process_made(tmp_path):
+    MADE.clear()
+    executor = Processes(2, prepare=make)
+    outcomes = run_items(made, items(), folder=tmp_path, executor=executor)
+    assert [o.result["made"] for o in outcomes] == [["a"]] * 4
+    assert {o.result["parent"] for o in outcomes} == {os.getpid()}
+    run_items(made, items(), folder=tmp_path, executor=executor)
+    assert MADE == ["a"]  # nothing is left to do, so that nothing is prepared
+
+
+def stopped(item, folder):
+    """Item b ends its worker by SIGTERM, which this process must not hear of."""
+    if item.name == "b":
+        os.kill(os.getpid(), signal.SIGTERM)
+    return {"alive": True}
+
+
+def test_a_prepared_worker_that_is_stopped_does_not_stop_this_process(tmp_path):
+    heard = []
+    before = signal.signal(signal.SIGTERM, lambda *_: heard.append("SIGTERM"))
+    try:
+        executor = Processes(2, attempts=1, prepare=make)
+        outcomes = run_items(stopped, items(), folder=tmp_path, executor=executor)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert [o.error is None for o in outcomes] == [True, False, True, True]
+    assert heard == []
 
 
 @pytest.mark.slow

@@ -129,7 +129,8 @@ def evaluate(
     from wbc_suite.evaluation import episode_seeds, plan_rollouts, run_rollouts
     from wbc_suite.evaluation.films import film_failures
     from wbc_suite.evaluation.results import collect
-    from wbc_suite.executors import make_executor, run_items
+    from wbc_suite.evaluation.rollouts import prepare_rollouts
+    from wbc_suite.executors import Processes, make_executor, run_items
 
     begun = time.perf_counter()
     arguments: dict[str, str | int | float | bool] = {"reward_shaping": shaped}
@@ -147,6 +148,8 @@ def evaluate(
             seeds = range(first_seed, first_seed + episodes)
         items[case] = plan_rollouts([case], seeds=seeds, chunk=chunk)
     runner = make_executor(executor, workers=workers)
+    if isinstance(runner, Processes) and not any(":" in n for n in policy + benchmarks):
+        runner.prepare = prepare_rollouts  # a module of a user's may hold a GPU
     every = [item for mine in items.values() for item in mine]
     with progress("Episodes", sum(len(i.payload["seeds"]) for i in every)) as advance:
         outcomes = run_items(
@@ -158,7 +161,8 @@ def evaluate(
         )
     results = collect(items, outcomes, seconds=time.perf_counter() - begun)
     if films:
-        film_failures(results, most=films, folder=output, executor=runner)
+        drawing = make_executor(executor, workers=workers)
+        film_failures(results, most=films, folder=output, executor=drawing)
     _report(results, output, as_json=as_json)
 
 

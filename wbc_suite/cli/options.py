@@ -245,17 +245,27 @@ def write_file(path: Path, write: Callable[[Path], object]) -> None:
 
 @contextmanager
 def progress(title: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show a bar on the error output where that is a terminal; call to advance it."""
+    """Show a bar on the error output where that is a terminal; call to advance it.
+
+    It has no thread of its own, so that workers may be forked meanwhile.
+    """
     from rich import progress as rich
     from rich.console import Console
 
     console = Console(stderr=True)
     columns = rich.BarColumn(), rich.MofNCompleteColumn(), rich.TimeRemainingColumn()
-    bar = rich.Progress(title, *columns, console=console, transient=True)
+    bar = rich.Progress(
+        title, *columns, console=console, transient=True, auto_refresh=False
+    )
     bar.disable = not console.is_terminal
+
+    def advance(done: int) -> None:
+        bar.advance(line, done)
+        bar.refresh()
+
     with bar:
         line = bar.add_task(title, total=total)
-        yield lambda done: bar.advance(line, done)
+        yield advance
 
 
 def tracked(items: Sequence[T], title: str) -> Iterator[T]:

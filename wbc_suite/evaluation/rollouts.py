@@ -1,12 +1,15 @@
 """Episodes of policies in environments, as work items of an executor."""
 
+import json
+import multiprocessing
 import re
 import shutil
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass
 from enum import StrEnum
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +90,8 @@ def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
     Recordings go to `episodes` in the folder, one file per item.
     """
     payload = item.payload
-    env = inner = make_case(payload)
+    in_worker = multiprocessing.parent_process() is not None
+    env = inner = _kept(_key(payload)) if in_worker else make_case(payload)
     if payload["record"]:
         path = folder / "episodes" / f"{item.name}.hdf5"
         path.unlink(missing_ok=True)  # a killed worker may have left a part
@@ -98,6 +102,29 @@ def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
     finally:
         env.close()
     return {"episodes": episodes}
+
+
+@lru_cache(maxsize=1)
+def _kept(key: str) -> RobotEnv:
+    """Make the environment of a case, once for all items that a worker runs."""
+    return make_case(json.loads(key))
+
+
+def _key(payload: Mapping[str, Any]) -> str:
+    return json.dumps({key: payload[key] for key in payload if key != "seeds"})
+
+
+def prepare_rollouts(item: WorkItem) -> None:
+    """Make the environment of an item and take an action, which compiles kernels.
+
+    Workers that are forked then have all of it. Errors are left to the item itself.
+    """
+    _kept.cache_clear()
+    seed = item.payload["seeds"][0]
+    with suppress(WbcError):
+        env = _kept(_key(item.payload))
+        observation, _ = env.reset(seed=seed)
+        env.step(make_policy(item.payload["policy"], env, seed)(observation))
 
 
 class ErrorKind(StrEnum):
