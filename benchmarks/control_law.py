@@ -21,12 +21,8 @@ import numba
 import numpy as np
 
 from wbc_suite.compiling import as_argument, plain
-from wbc_suite.control.loop.inverse_dynamics import (
-    CustomLaw,
-    Needed,
-    needed_kernels,
-    write_commands,
-)
+from wbc_suite.control.loop.inverse_dynamics import write_commands
+from wbc_suite.control.loop.kernels import LoopKernels, bind_kernels
 from wbc_suite.control.loop.physics import Physics, bind_physics
 from wbc_suite.control.loop.records import Records, gather
 
@@ -44,13 +40,12 @@ def control_only(
     physics: Physics,
     laws: Records,
     drives: Records,
-    hands: Needed,
-    custom_law: CustomLaw,
+    kernels: LoopKernels,
     steps: int,
 ) -> None:
     """Compute the control of one instant again and again."""
     for _ in range(steps):
-        write_commands(physics, laws, drives, hands, custom_law, None)
+        write_commands(physics, laws, drives, kernels, None)
 
 
 class Law:
@@ -62,16 +57,17 @@ class Law:
         stand = self.stand
         self.physics = bind_physics(stand.model, stand.data)
         pieces = [(law.record, law.drives) for law in stand.controller.laws]
-        laws, drives = gather(pieces)
-        self.records = laws, drives, *needed_kernels(laws)
+        self.argument, self.records = as_argument(self.physics), gather(pieces)
+        self.kernels, self.owner = bind_kernels(self.records[0], self.argument)
         mujoco.mj_step1(stand.model, stand.data)
 
     def plain(self, steps: int) -> None:
         """Compute the control of one instant again and again, in plain Python."""
-        write, (laws, drives, *kernels) = plain(write_commands), self.records
-        laws, drives = laws.view(np.recarray), drives.view(np.recarray)
+        write = plain(write_commands)
+        laws, drives = (records.view(np.recarray) for records in self.records)
+        kernels, _ = bind_kernels(laws, self.physics, compiled=False)
         for _ in range(steps):
-            write(self.physics, laws, drives, *kernels, None)
+            write(self.physics, laws, drives, kernels, None)
 
     def run(self, blocks: int) -> dict[str, list[float]]:
         """Return times of one step by side, us."""
@@ -93,7 +89,7 @@ class Law:
         return found
 
     def _kernel(self, steps: int) -> None:
-        control_only(as_argument(self.physics), *self.records, steps)
+        control_only(self.argument, *self.records, self.kernels, steps)
 
     def _physics(self, steps: int) -> None:
         mujoco.mj_step(self.stand.model, self.stand.data, steps)

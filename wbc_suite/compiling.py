@@ -3,6 +3,7 @@
 Machine code is kept on disk, in one folder for each state of the package's kernels.
 """
 
+import ctypes
 import inspect
 import logging
 import threading
@@ -10,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache, partial
+from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar, cast
 
@@ -17,6 +19,7 @@ import numba
 import numpy as np
 from numba import types
 from numba.experimental import structref
+from numba.extending import register_jitable
 
 from wbc_suite.kernel_cache import cache_folder
 from wbc_suite.typing import Records
@@ -48,48 +51,95 @@ def compiled(function: Function, *, kept: bool = True, **options: Any) -> Functi
         kept: Whether the machine code is kept on disk; not where an argument is a
             kernel that is made at run time, whose type no other process knows.
         options: Of numba: `nogil` releases the interpreter's lock, for long calls only
-            (a thread needs up to 50 us to get it back); `inline` compiles a kernel only
-            inside its callers, which are else compiled with all that it calls again.
+            (a thread needs up to 50 us to get it back).
     """
-    previous = _numba.CACHE_DIR
-    _numba.CACHE_DIR = str(cache_folder())
-    try:
-        kernel = _njit(cache=kept, error_model="numpy", **options)(function)
-    finally:
-        _numba.CACHE_DIR = previous
+    kernel = _in_cache(partial(_njit, cache=kept, **_OPTIONS, **options), function)
     if not _numba.DISABLE_JIT:
         _KERNELS.append(kernel)
     return cast("Function", kernel)
 
 
 compiled_nogil = partial(compiled, nogil=True)
-compiled_each_time = partial(compiled, kept=False)
-compiled_inline = partial(compiled, inline="always")
+
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
 
 
-def as_pointer(kernel: Function, *arguments: Any) -> Function:
-    """Return a kernel as a value that other kernels call, whichever kernel it is.
+def inner(function: Function) -> Function:
+    """Let kernels call a function, which is compiled with them.
 
-    Kernels for equal types of arguments are one type, so that the caller is compiled
-    once for all of them.
+    It has no entry for Python, which costs as much to compile as ten lines, and no
+    machine code of its own on disk. Python calls it as plain Python.
+    """
+    _INNER.append(function)
+    return cast("Function", register_jitable(**_OPTIONS)(function))
+
+
+_INNER: list[Any] = []
+"""Functions that kernels call."""
+
+
+def by_address(kernel: Any, *arguments: Any) -> Any:
+    """Return a kernel as a value, for a field of a `struct`.
+
+    A kernel that calls another one by its name holds a copy of that one, which is
+    optimised and emitted again. One that finds it in a field holds only a call, which
+    costs 5 ns, and the field decides which kernel it is: what a robot does not use is
+    not compiled.
 
     Args:
-        kernel: What `compiled` returned, a function that returns nothing.
-        arguments: Examples of its arguments.
+        kernel: A function of `compiled` or `inner`; its result is annotated as None,
+            bool, int or float, or it returns nothing.
+        arguments: What it is called with, or values of the same types.
     """
     if _numba.DISABLE_JIT:
         return kernel
-    return _pointer(kernel, types.void(*map(_untyped.typeof, arguments)))
+    function = getattr(kernel, "py_func", kernel)
+    return _entry(function, tuple(map(_untyped.typeof, arguments)))
 
 
 @cache
-def _pointer(kernel: Any, signature: Any) -> Any:
-    """Compile a kernel for a signature; it lives on, as its machine code."""
+def _entry(function: Any, arguments: Any) -> Any:
+    """Return the machine code of a kernel, which lives as long as the process."""
+    result = function.__annotations__.get("return")
+    result = _RESULTS[getattr(result, "__name__", str(result))]
+    is_kept = Path(function.__code__.co_filename).is_file()
+    make = _untyped.cfunc(result(*arguments), cache=is_kept, error_model="numpy")
+    return _in_cache(make, function)
+
+
+class Callback(types.WrapperAddressProtocol):
+    """A Python function without arguments, as a value that kernels call.
+
+    It runs with the interpreter's lock, whether or not its caller has it, and has to
+    live as long as the `struct`. What it raises is printed, and ignored.
+    """
+
+    def __init__(self, function: Callable[[], None]) -> None:
+        self._entry = ctypes.CFUNCTYPE(None)(function)
+
+    def __wrapper_address__(self) -> int:
+        """Return the address of the machine code."""
+        return ctypes.cast(self._entry, ctypes.c_void_p).value or 0
+
+    def signature(self) -> Any:
+        """Return numba's signature."""
+        return types.void()
+
+
+_RESULTS: dict[str, Any] = {
+    "None": types.void,
+    "bool": types.boolean,
+    "int": types.int64,
+    "float": types.float64,
+}
+
+
+def _in_cache(make: Any, function: Any) -> Any:
+    """Let numba make a kernel whose machine code is kept in the package's folder."""
     previous = _numba.CACHE_DIR
     _numba.CACHE_DIR = str(cache_folder())
     try:
-        make = _untyped.cfunc(signature, cache=True, error_model="numpy")
-        return make(kernel.py_func)
+        return make(function)
     finally:
         _numba.CACHE_DIR = previous
 
@@ -109,7 +159,7 @@ def plain(kernel: Any) -> Any:
     function = getattr(kernel, "py_func", None) or inspect.unwrap(kernel)
     names = dict(function.__globals__)
     for name in set(function.__code__.co_names) & set(names):
-        if any(names[name] is kernel for kernel in _KERNELS):
+        if any(names[name] is kernel for kernel in (*_KERNELS, *_INNER)):
             names[name] = plain(names[name])
     return FunctionType(function.__code__, names, function.__name__)
 

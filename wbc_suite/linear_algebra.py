@@ -7,7 +7,7 @@ solvers use. Functions take the size n of the system, so that buffers may be lar
 import numba
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.typing import Matrix, Vector
 
 _SMALLEST = 1e-30  # square of a length that counts as zero
@@ -38,7 +38,7 @@ def copy_rows(source: Matrix, target: Matrix) -> None:
         copy_vector(source[i], target[i])
 
 
-@compiled
+@inner
 def cross(a: Vector, b: Vector) -> Vector:
     """Return the cross product of two vectors, shape (3,)."""
     c = np.empty(3)
@@ -215,7 +215,7 @@ def row_space(W: Matrix, tolerance: float, V: Matrix, lengths: Vector) -> int:
     return rank
 
 
-@compiled
+@inner
 def subtract_projection(V: Matrix, count: int, v: Vector) -> None:
     """Subtract from v, in place, its projection onto the first rows of V."""
     n = v.shape[0]

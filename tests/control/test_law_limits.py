@@ -31,11 +31,10 @@ def run(panda, seconds):
 
 def as_plain_python(simulation):
     """Run the laws of a simulation without numba from now on."""
-    physics = bind_physics(simulation.model, simulation.data)
-    records = [x.view(np.recarray) for x in simulation._law_arguments[1:3]]
-    simulation._law_arguments = (physics, *records, *simulation._law_arguments[3:])
+    simulation._physics = bind_physics(simulation.model, simulation.data)
+    simulation._records = [x.view(np.recarray) for x in simulation._records]
     simulation._write_commands = plain(write_commands)
-    simulation.compiled = False
+    simulation.compiled, simulation._runs_plain = False, True
 
 
 @pytest.fixture

@@ -19,7 +19,8 @@ from wbc_suite.control import (
 )
 from wbc_suite.control.composite.protocols import solver_of_body
 from wbc_suite.control.dynamics.arrays import for_plain_python
-from wbc_suite.control.loop.inverse_dynamics import needed_kernels, write_commands
+from wbc_suite.control.loop.inverse_dynamics import write_commands
+from wbc_suite.control.loop.kernels import bind_kernels
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
 from wbc_suite.control.part.registry import PART_CONTROLLERS
@@ -117,11 +118,12 @@ def parts_in(config):
 def write_all_commands(controller, state):
     """Compute the commands of all actuators once, in plain Python."""
     laws, drives = gather([(law.record, law.drives) for law in controller.laws])
-    kernels, solver = needed_kernels(laws), solver_of_body(controller)
+    solver = solver_of_body(controller)
     bodies = None if solver is None else (for_plain_python(solver.dynamics),)
     laws, drives = laws.view(np.recarray), drives.view(np.recarray)
     physics = bind_physics(state.model, state.data)
-    plain(write_commands)(physics, laws, drives, *kernels, bodies)
+    kernels, _ = bind_kernels(laws, physics, bodies, compiled=False)
+    plain(write_commands)(physics, laws, drives, kernels, bodies)
 
 
 @pytest.mark.slow

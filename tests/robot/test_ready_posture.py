@@ -8,7 +8,8 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.compiling import as_argument
 from wbc_suite.control import RobotState
 from wbc_suite.control.law.joint_laws import JointLaw
-from wbc_suite.control.loop.inverse_dynamics import needed_kernels, write_commands
+from wbc_suite.control.loop.inverse_dynamics import write_commands
+from wbc_suite.control.loop.kernels import bind_kernels
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
 from wbc_suite.kinematics import Configuration
@@ -82,7 +83,8 @@ class Lone:
         physics = as_argument(bind_physics(self.model, self.data))
         records = gather([(law.record, law.drives)])
         law.adopt(*records)
-        arguments = physics, *records, *needed_kernels(records[0]), None
+        kernels, _owner = bind_kernels(records[0], physics)
+        arguments = physics, *records, kernels, None
         for _ in range(round(seconds / self.model.opt.timestep)):
             mujoco.mj_step1(self.model, self.data)
             write_commands(*arguments)

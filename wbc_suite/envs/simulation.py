@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from contextlib import nullcontext
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -24,11 +25,9 @@ from wbc_suite.control.dynamics.state_source import (
     source_memory,
     use_all_feet,
 )
-from wbc_suite.control.loop.advance import advance, advance_custom_laws
-from wbc_suite.control.loop.inverse_dynamics import (
-    needed_kernels,
-    write_commands,
-)
+from wbc_suite.control.loop.advance import advance
+from wbc_suite.control.loop.inverse_dynamics import write_commands
+from wbc_suite.control.loop.kernels import DECIDING, bind_kernels
 from wbc_suite.control.loop.mujoco_functions import addresses
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
@@ -101,21 +100,21 @@ class Simulation:
             for c in ([] if exact else self._dynamic)
         ]
         self._believed = believed
-        physics, state = bind_physics(model, believed), self._watch.state
-        bodies = [solver.dynamics for solver in self._dynamic]
-        kernels = *needed_kernels(self._laws), tuple(map(as_argument, bodies)) or None
-        records = self._laws, self._drives, *kernels
-        views = as_argument(physics), as_argument(state)
+        self._runs_plain, self._needed = not compiled, b""
+        self._physics: Any = bind_physics(model, believed)
+        self._bodies: Any = tuple(solver.dynamics for solver in self._dynamic) or None
+        self._records = self._laws, self._drives
+        self._write_commands = write_commands
+        if compiled:
+            self._physics = as_argument(self._physics)
+            self._bodies = self._bodies and tuple(map(as_argument, self._bodies))
+        else:
+            self._write_commands = plain(write_commands)
+            self._records = tuple(x.view(np.recarray) for x in self._records)
+            self._bodies = self._bodies and tuple(map(for_plain_python, self._bodies))
         states = *addresses(model, data), addresses(model, believed)[1]
-        sources = tuple(map(as_argument, self._sources)) or None
-        self._loop_arguments = (*states, *views, *records, ticks, sources)
-        self._has_custom_laws = kernels[1] is not None
-        self._write_commands = write_commands if compiled else plain(write_commands)
-        self._law_arguments = views[0], *records
-        if not compiled:
-            laws, drives = self._laws.view(np.recarray), self._drives.view(np.recarray)
-            kernels = *kernels[:-1], tuple(map(for_plain_python, bodies)) or None
-            self._law_arguments = physics, laws, drives, *kernels
+        self._first = *states, self._physics, as_argument(self._watch.state)
+        self._last = ticks, tuple(map(as_argument, self._sources)) or None
         self.memory = self._make_memory()
         self._new = self.memory.read()
         with announced("the control loop"):
@@ -223,13 +222,25 @@ class Simulation:
             mujoco.mj_forward(self.model, self.data)
         self.data.qacc_warmstart[:] = start
 
+    def _bind_kernels(self) -> None:
+        """Compile what the laws need, if that is not the same as before."""
+        needed = self._laws[[*DECIDING]].tobytes()
+        if needed != self._needed:
+            kernels, self._owner = bind_kernels(
+                self._laws, self._physics, self._bodies, compiled=not self._runs_plain
+            )
+            records = *self._records, kernels, self._bodies
+            self._law_arguments = self._physics, *records
+            self._loop_arguments = *self._first, *records, *self._last
+            self._needed = needed
+
     def _call_loop(self, steps: int) -> int:
         """Advance steps; return how many were made."""
+        self._bind_kernels()
         done = -1
         if math.isfinite(self.data.time):
             if self.compiled:
-                run = advance_custom_laws if self._has_custom_laws else advance
-                done = run(*self._loop_arguments, steps)
+                done = advance(*self._loop_arguments, steps)
             elif self._watch.is_usable():
                 done = steps if self._step_in_python(steps) else -1
         if done < 0:

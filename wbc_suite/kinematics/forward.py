@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import compiled, inner, struct
 from wbc_suite.typing import Indices, Matrix, Vector
 
 
@@ -177,7 +177,7 @@ def compute_com(robot: RobotArrays) -> None:
     robot.is_current[1] = 1
 
 
-@compiled
+@inner
 def multiply_poses(A: Vector, B: Vector, out: Vector) -> None:
     """Write the pose `A B`; rotations by columns, then positions."""
     for i in range(3):
@@ -187,7 +187,7 @@ def multiply_poses(A: Vector, B: Vector, out: Vector) -> None:
         out[9 + i] = A[9 + i] + a * B[9] + b * B[10] + c * B[11]
 
 
-@compiled
+@inner
 def _turn_about(T: Vector, k: int, angle: float, column: Vector) -> None:
     """Turn a pose about its own axis k, which mixes the two other columns."""
     s, c = np.sin(angle), np.cos(angle)
@@ -198,7 +198,7 @@ def _turn_about(T: Vector, k: int, angle: float, column: Vector) -> None:
     _write_revolute(T, T[3 * k], T[3 * k + 1], T[3 * k + 2], column)
 
 
-@compiled
+@inner
 def _turn(T: Vector, axis: Vector, angle: float, column: Vector) -> None:
     """Turn a pose about a unit axis of its own: `R (c I + s [a] + (1 - c) a a^T)`."""
     x, y, z = axis[0], axis[1], axis[2]
@@ -212,7 +212,7 @@ def _turn(T: Vector, axis: Vector, angle: float, column: Vector) -> None:
     _write_revolute(T, *_in_world(T, axis), column)
 
 
-@compiled
+@inner
 def _shift(T: Vector, axis: Vector, distance: float, column: Vector) -> None:
     """Shift a pose along a unit axis of its own."""
     x, y, z = _in_world(T, axis)
@@ -224,7 +224,7 @@ def _shift(T: Vector, axis: Vector, distance: float, column: Vector) -> None:
         column[i] = 0.0
 
 
-@compiled
+@inner
 def _move_freely(T: Vector, q: Vector, columns: Matrix) -> None:
     """Move a pose by a position and unit quaternion x y z w."""
     x, y, z, w = q[3], q[4], q[5], q[6]
@@ -246,7 +246,7 @@ def _move_freely(T: Vector, q: Vector, columns: Matrix) -> None:
         _write_revolute(T, T[3 * k], T[3 * k + 1], T[3 * k + 2], columns[3 + k])
 
 
-@compiled
+@inner
 def _in_world(T: Vector, axis: Vector) -> tuple[float, float, float]:
     """Return an axis of a pose in world coordinates."""
     x, y, z = axis[0], axis[1], axis[2]
@@ -257,7 +257,7 @@ def _in_world(T: Vector, axis: Vector) -> tuple[float, float, float]:
     )
 
 
-@compiled
+@inner
 def _write_revolute(T: Vector, u: float, v: float, w: float, column: Vector) -> None:
     """Write `(p x a, a)` for the axis a through a pose's origin p."""
     x, y, z = T[9], T[10], T[11]

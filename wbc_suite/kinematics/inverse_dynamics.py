@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import compiled, compiled_inline, struct
+from wbc_suite.compiling import inner, struct
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.typing import Matrix, Vector
 
@@ -46,7 +46,7 @@ def inertia_arrays(model: pin.Model) -> InertiaArrays:
     )
 
 
-@compiled_inline
+@inner
 def compute_torques(
     robot: RobotArrays, inertias: InertiaArrays, v: Vector, a: Vector, tau: Vector
 ) -> None:
@@ -94,7 +94,7 @@ def compute_torques(
             forces[parents[j], i] += force[i]
 
 
-@compiled
+@inner
 def _add_rate_of_column(
     velocity: Vector, column: Vector, speed: float, rate: Vector
 ) -> None:
@@ -109,7 +109,7 @@ def _add_rate_of_column(
     rate[5] += speed * (w_x * r_y - w_y * r_x)
 
 
-@compiled
+@inner
 def _write_link_force(
     T: Vector,
     mass: float,

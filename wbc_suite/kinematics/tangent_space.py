@@ -5,7 +5,7 @@ Tests hold the kernels to Pinocchio: `pin.integrate` and `pin.difference`.
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.kinematics.forward import JointKind, RobotArrays
 from wbc_suite.typing import Vector
 
@@ -17,7 +17,7 @@ def integrate_joints(robot: RobotArrays, dq: Vector) -> None:
     robot.is_current[0] = robot.is_current[1] = robot.is_current[2] = 0
 
 
-@compiled
+@inner
 def integrate(robot: RobotArrays, q: Vector, dq: Vector) -> None:
     """Move q in place: `q (+) dq`; the robot has no joint of kind `OTHER`."""
     kinds, q_start, v_start = robot.kind, robot.q_start, robot.v_start
@@ -29,7 +29,7 @@ def integrate(robot: RobotArrays, q: Vector, dq: Vector) -> None:
             q[k] += dq[i]
 
 
-@compiled
+@inner
 def difference(robot: RobotArrays, origin: Vector, q: Vector, out: Vector) -> None:
     """Write `q (-) origin`, shape (nv,); the robot has no joint of kind `OTHER`."""
     kinds, q_start, v_start = robot.kind, robot.q_start, robot.v_start
@@ -41,7 +41,7 @@ def difference(robot: RobotArrays, origin: Vector, q: Vector, out: Vector) -> No
             out[i] = q[k] - origin[k]
 
 
-@compiled
+@inner
 def _free_difference(origin: Vector, q: Vector, out: Vector) -> None:
     """Write `log6(T_origin^-1 T_q)`; positions and quaternions x y z w.
 
@@ -79,7 +79,7 @@ def _free_difference(origin: Vector, q: Vector, out: Vector) -> None:
     out[3], out[4], out[5] = r_x, r_y, r_z
 
 
-@compiled
+@inner
 def _integrate_free(q: Vector, dq: Vector) -> None:
     """Move position and quaternion x y z w by `exp6(dq)`, in the body's axes.
 

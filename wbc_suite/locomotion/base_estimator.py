@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import compiled, inner, struct
 from wbc_suite.linear_algebra import cross, dot, solve
 from wbc_suite.qp.lie import exp3
 from wbc_suite.typing import Indices, Matrix, Vector
@@ -155,7 +155,7 @@ def propagate(
         P[i, i] += dt * noise[4] ** 2
 
 
-@compiled
+@inner
 def _write_transition(
     estimate: BaseEstimate, f: Vector, turn: Matrix, dt: float
 ) -> None:
@@ -183,7 +183,7 @@ def _turn(R: Matrix, turn: Matrix) -> None:
             R[i, j] = x * turn[0, j] + y * turn[1, j] + z * turn[2, j]
 
 
-@compiled
+@inner
 def _propagate_covariance(estimate: BaseEstimate) -> None:
     """Write F P F^T into P; feet have no transition of their own."""
     F, P, work = estimate.F, estimate.P, estimate.work
@@ -227,7 +227,7 @@ def correct(estimate: BaseEstimate, feet: Matrix, stands: Indices, dt: float) ->
             _put_down(estimate, feet, k)
 
 
-@compiled
+@inner
 def _put_down(estimate: BaseEstimate, feet: Matrix, k: int) -> None:
     """Estimate the position of a foot anew."""
     P, first = estimate.P, FEET + 3 * k
@@ -238,7 +238,7 @@ def _put_down(estimate: BaseEstimate, feet: Matrix, k: int) -> None:
         P[first + i, first + i] = UNKNOWN
 
 
-@compiled
+@inner
 def _correct_by_foot(estimate: BaseEstimate, feet: Matrix, k: int) -> bool:
     """Correct by the position of one foot; return whether it is plausible."""
     P, H, work = estimate.P, estimate.H, estimate.work
@@ -287,7 +287,7 @@ def _write_foot_jacobian(estimate: BaseEstimate, k: int, u: Vector) -> None:
     H[2, TURN], H[2, TURN + 1] = -u[1], u[0]
 
 
-@compiled
+@inner
 def _apply(estimate: BaseEstimate, change: Vector) -> None:
     """Add an error state to the estimate."""
     turn = np.empty((3, 3))

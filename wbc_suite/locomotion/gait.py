@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from wbc_suite.compiling import compiled, readable, struct
+from wbc_suite.compiling import inner, readable, struct
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Records, Vector
 
@@ -306,7 +306,7 @@ def begin_gait(gait: Gait, measured: Measured, yaw: float) -> None:
     gait.swings[:] = 0
 
 
-@compiled
+@inner
 def approach_command(
     state: CompiledRecords, command: Vector, acceleration: float, dt: float
 ) -> bool:
@@ -330,7 +330,7 @@ def approach_command(
     return moving
 
 
-@compiled
+@inner
 def heading_axes(yaw: float) -> Matrix:
     """Return the horizontal axes of a heading as columns, shape (2, 2)."""
     R = np.empty((2, 2))

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import inner
 from wbc_suite.locomotion.gait import Gait, Measured, heading_axes
 from wbc_suite.typing import Matrix, Vector
 
 
-@compiled
+@inner
 def keep_in_soles(
     gait: Gait, measured: Measured, point: Vector, foot: int, out: Vector
 ) -> float:
@@ -41,7 +41,7 @@ def keep_in_soles(
     return margin
 
 
-@compiled
+@inner
 def _extend_box(
     R: Matrix, own: Matrix, place: Vector, x: float, y: float, low: Vector, high: Vector
 ) -> None:

@@ -6,7 +6,7 @@ point: a step toward humanoid push recovery", Humanoids.
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.locomotion.gait import (
     GRAVITY,
     Gait,
@@ -84,7 +84,7 @@ def plan_trot(
     plan.com_acceleration[2] = HEIGHT_GAINS[0] * error - HEIGHT_GAINS[1] * velocity[2]
 
 
-@compiled
+@inner
 def _move_reference(reference: Vector, wanted: Vector, com: Vector, dt: float) -> None:
     """Move the reference of the centre of mass, on a leash."""
     x = reference[0] + wanted[0] * dt - com[0]
@@ -93,7 +93,7 @@ def _move_reference(reference: Vector, wanted: Vector, com: Vector, dt: float) -
     reference[0], reference[1] = com[0] + share * x, com[1] + share * y
 
 
-@compiled
+@inner
 def capture_point_margin(gait: Gait, measured: Measured, height: float) -> float:
     """Return how far the capture point is inside the box about all feet, m."""
     state = gait.state[0]
@@ -112,7 +112,7 @@ def capture_point_margin(gait: Gait, measured: Measured, height: float) -> float
     return margin
 
 
-@compiled
+@inner
 def _switch_mode(gait: Gait, measured: Measured, moving: bool, margin: float) -> None:
     """Begin to step for a command or after a push; stand when both are over."""
     state, settings = gait.state[0], gait.settings[0]
@@ -136,7 +136,7 @@ def _switch_mode(gait: Gait, measured: Measured, moving: bool, margin: float) ->
         state.reference[0], state.reference[1] = measured.com[0], measured.com[1]
 
 
-@compiled
+@inner
 def _plan_feet(gait: Gait, measured: Measured, wanted: Vector, plan: Plan) -> None:
     """Write loads of standing feet, and the motion of those that swing."""
     state, settings = gait.state[0], gait.settings[0]
@@ -166,7 +166,7 @@ def _plan_feet(gait: Gait, measured: Measured, wanted: Vector, plan: Plan) -> No
         state.ground += 0.02 * (ground / standing - state.ground)
 
 
-@compiled
+@inner
 def _place_foot(
     gait: Gait, measured: Measured, wanted: Vector, k: int, left: float
 ) -> None:

@@ -12,7 +12,7 @@ based on step timing adaptation", arXiv 1704.01271.
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.locomotion.gait import (
     GRAVITY,
     Gait,
@@ -103,7 +103,7 @@ def plan_walk(
     plan.com_acceleration[2] = HEIGHT_GAINS[0] * error - HEIGHT_GAINS[1] * velocity[2]
 
 
-@compiled
+@inner
 def _stand(
     gait: Gait,
     measured: Measured,
@@ -150,7 +150,7 @@ def _stand(
         keep_in_soles(gait, measured, zmp.copy(), -1, zmp)
 
 
-@compiled
+@inner
 def _begin_step(gait: Gait, stance: int, since: float) -> None:
     state = gait.state[0]
     state.mode, state.stance, state.since = _STEP, stance, since
@@ -159,7 +159,7 @@ def _begin_step(gait: Gait, stance: int, since: float) -> None:
     gait.swings[0] = gait.swings[1] = 0
 
 
-@compiled
+@inner
 def _step(
     gait: Gait,
     measured: Measured,
@@ -210,7 +210,7 @@ def _step(
     _swing(gait, measured, goal, dt, plan)
 
 
-@compiled
+@inner
 def _has_landed(gait: Gait, measured: Measured) -> bool:
     """Return whether the weight may go to the foot that swings, or has to."""
     state = gait.state[0]
@@ -220,7 +220,7 @@ def _has_landed(gait: Gait, measured: Measured) -> bool:
     return bool(late or rests or swing[2] - stance[2] < LANDED)
 
 
-@compiled
+@inner
 def _swing(gait: Gait, measured: Measured, goal: Vector, dt: float, plan: Plan) -> None:
     """Write the motion of the swinging foot."""
     state, settings = gait.state[0], gait.settings[0]
@@ -251,7 +251,7 @@ def _swing(gait: Gait, measured: Measured, goal: Vector, dt: float, plan: Plan) 
     )
 
 
-@compiled
+@inner
 def _periodic_step(
     gait: Gait, omega: float, stance: int
 ) -> tuple[Vector, Vector, Vector]:
@@ -282,7 +282,7 @@ def _periodic_step(
     return step, own, landing
 
 
-@compiled
+@inner
 def _landing_place(
     gait: Gait,
     measured: Measured,
@@ -313,7 +313,7 @@ def _landing_place(
     return np.sqrt((x - near_x) ** 2 + (y - near_y) ** 2)
 
 
-@compiled
+@inner
 def _choose_duration(
     gait: Gait,
     measured: Measured,

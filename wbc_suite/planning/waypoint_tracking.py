@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.typing import Matrix, Vector
 
 HORIZONS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.32, 0.45, 0.6)  # s, to meet the motion at
@@ -55,7 +55,7 @@ def track_waypoints(
                 break
 
 
-@compiled
+@inner
 def cruise_speed(
     d: float, v0: float, v1: float, acceleration: float, time: float
 ) -> float:
@@ -78,7 +78,7 @@ def cruise_speed(
     return 0.5 * (low + high)
 
 
-@compiled
+@inner
 def _covered(
     cruise: float, v0: float, v1: float, acceleration: float, time: float
 ) -> float:

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import compiled, inner, struct
 from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import Indices, Matrix, Vector
@@ -142,7 +142,7 @@ def solve_warm(qp: QpArrays) -> bool:
     return False
 
 
-@compiled
+@inner
 def _end(row: Vector) -> int:
     """Return the end of a row's entries: many end early, as joints count outwards."""
     end = row.shape[0]
@@ -151,7 +151,7 @@ def _end(row: Vector) -> int:
     return end
 
 
-@compiled
+@inner
 def _state_system(qp: QpArrays) -> int:
     """Write the small system and its right-hand side; return its size.
 
@@ -190,7 +190,7 @@ def _state_system(qp: QpArrays) -> int:
     return size
 
 
-@compiled
+@inner
 def _recover(qp: QpArrays, size: int) -> None:
     """Write x and the multipliers from the solution of the small system."""
     n, m = qp.x.shape[0], qp.e.shape[0]
@@ -215,7 +215,7 @@ def _recover(qp: QpArrays, size: int) -> None:
             multipliers[i] += qp.diagonal[1, i] - weight * x[i]
 
 
-@compiled
+@inner
 def _deactivate(qp: QpArrays) -> bool:
     """Make inactive what has a multiplier of the wrong sign; return if there is any."""
     n, changed = qp.x.shape[0], False

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_count, check_number
-from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.compiling import as_argument, compiled, inner, struct
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.qp.kernel import Kernel
@@ -146,7 +146,7 @@ def floor_rows(
             G[row, col] = -spheres.moves[spheres.joint[k], col] * speed
 
 
-@compiled
+@inner
 def _find_lowest(robot: RobotArrays, spheres: SphereArrays) -> None:
     """Find the lowest spheres and their distances from the floor."""
     found, distance, count = spheres.found, spheres.distance, 0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.linear_algebra import (
     copy_rows,
     dot,
@@ -52,7 +52,7 @@ def least_change(
     return False
 
 
-@compiled
+@inner
 def _activate(  # noqa: C901, one loop
     row: Vector, sign: float, bound: float, x: Vector, work: Matrix, count: int
 ) -> int:
@@ -91,7 +91,7 @@ def _activate(  # noqa: C901, one loop
                 normals[k, i] = normals[k + 1, i]
 
 
-@compiled
+@inner
 def _most_violated(
     rows: Matrix, low: Vector, high: Vector, x: Vector
 ) -> tuple[int, float]:
@@ -107,7 +107,7 @@ def _most_violated(
     return row, sign
 
 
-@compiled
+@inner
 def _project_out(sign: float, row: Vector, work: Matrix, count: int) -> None:
     """Write r and `z = sign row - N^T r`, orthogonal to the active normals N."""
     n = work.shape[1]
@@ -125,7 +125,7 @@ def _project_out(sign: float, row: Vector, work: Matrix, count: int) -> None:
     solve_upper(L, r, count)
 
 
-@compiled
+@inner
 def _least_norm(bounds: Vector, x: Vector, work: Matrix, count: int) -> None:
     """Write the shortest x at the bounds of the active rows, free of step errors."""
     Q, L = _factorise(work, count)
@@ -133,7 +133,7 @@ def _least_norm(bounds: Vector, x: Vector, work: Matrix, count: int) -> None:
     lq_solve(Q, x.shape[0], bounds, x)
 
 
-@compiled
+@inner
 def _factorise(work: Matrix, count: int) -> tuple[Matrix, Matrix]:
     """Return the factors Q and L of the active normals, `N = L Q`."""
     n = work.shape[1]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.linear_algebra import dot
 from wbc_suite.typing import Matrix, Vector
 
@@ -63,7 +63,7 @@ def exp3(x: float, y: float, z: float, out: Matrix) -> None:
     _write_series(x, y, z, a, b, out)
 
 
-@compiled
+@inner
 def _write_series(
     x: float, y: float, z: float, a: float, b: float, out: Matrix
 ) -> None:
@@ -82,7 +82,7 @@ def is_usable(target: Vector) -> bool:
     return all(-FAR < value < FAR for value in values)  # NaN compares false
 
 
-@compiled
+@inner
 def saturate(step: Vector, limit: float) -> None:
     """Shorten a step in place to the given length, keeping its direction."""
     norm = np.sqrt(dot(step, step, step.shape[0]))
@@ -91,7 +91,7 @@ def saturate(step: Vector, limit: float) -> None:
             step[i] *= limit / norm
 
 
-@compiled
+@inner
 def inverse_left_jacobian(r: Vector, angle: float, out: Matrix) -> None:
     """Write `Jl^-1(r) = I - [r] / 2 + b [r]^2`, the inverse left Jacobian of SO(3)."""
     if angle < _SMALL_ANGLE:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import compiled, inner, struct
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.configuration import named_joints
 from wbc_suite.qp.kernel import Kernel
@@ -208,7 +208,7 @@ def merge_bounds(
         kinds[i], kinds[nv + i] = lo_kind, hi_kind
 
 
-@compiled
+@inner
 def braking_step(distance: float, gain: float, a: float, dt: float) -> float:
     """Return the greatest step towards a limit that is a distance away.
 

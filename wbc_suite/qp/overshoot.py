@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import inner, struct
 from wbc_suite.qp.equality import HeldFrames
 from wbc_suite.qp.strict_level import LevelArrays
 from wbc_suite.typing import Matrix, Vector
@@ -34,7 +34,7 @@ class OvershootArrays(NamedTuple):
     at_rest: Vector  # (1,), s since one of them moved
 
 
-@compiled
+@inner
 def damp_overshoot(
     past: OvershootArrays,
     levels: tuple[LevelArrays, ...],
@@ -62,7 +62,7 @@ def damp_overshoot(
     return damping
 
 
-@compiled
+@inner
 def turned(v: float, before: float, change: float) -> bool:
     """Return whether a joint of velocity v turns back, after it had just done so.
 
@@ -73,7 +73,7 @@ def turned(v: float, before: float, change: float) -> bool:
     return to_and_fro and min(abs(now), abs(change)) > _CHANGE
 
 
-@compiled
+@inner
 def _keep(kept: Vector, place: int, now: Vector, moved: bool) -> tuple[int, bool]:
     """Copy targets to their place; return the next one, and if any has moved."""
     for value in now:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inline, struct
+from wbc_suite.compiling import compiled, inner, struct
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.linear_algebra import copy_rows
 from wbc_suite.qp.problem import UNBOUNDED
@@ -58,7 +58,7 @@ def self_collision_rows(
         h[row] = min(max(speed, -SEPARATION) * dt, UNBOUNDED)
 
 
-@compiled_inline
+@inner
 def _find_nearest(robot: RobotArrays, capsules: CapsuleArrays) -> None:
     """Find the nearest pairs within the influence, and their distances."""
     _place_capsules(robot, capsules)
@@ -85,7 +85,7 @@ def _find_nearest(robot: RobotArrays, capsules: CapsuleArrays) -> None:
             total += 1
 
 
-@compiled
+@inner
 def insert_nearest(
     found: Indices, distance: Vector, count: int, item: int, d: float
 ) -> None:
@@ -97,7 +97,7 @@ def insert_nearest(
     distance[row], found[row] = d, item
 
 
-@compiled
+@inner
 def _place_capsules(robot: RobotArrays, capsules: CapsuleArrays) -> None:
     """Write ends, middles and bounding balls in the world."""
     for c in range(capsules.joint.shape[0]):
@@ -113,7 +113,7 @@ def _place_capsules(robot: RobotArrays, capsules: CapsuleArrays) -> None:
         capsules.reach[c] = capsules.radius[c] + 0.5 * np.sqrt(square)
 
 
-@compiled
+@inner
 def _update_list(capsules: CapsuleArrays) -> None:
     """List the pairs that may be within the influence, if capsules have moved."""
     middle, known = capsules.middle, capsules.listed_middle
@@ -134,13 +134,13 @@ def _update_list(capsules: CapsuleArrays) -> None:
     capsules.listed_count[0] = count
 
 
-@compiled
+@inner
 def _square_distance(a: Vector, b: Vector) -> float:
     """Return the squared distance of two points."""
     return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
 
 
-@compiled
+@inner
 def _write_row(
     robot: RobotArrays, capsules: CapsuleArrays, row: int, out: Vector
 ) -> None:
@@ -178,7 +178,7 @@ def _write_row(
             out[col] = -side * speed
 
 
-@compiled
+@inner
 def speed_along(J: Vector, n: Vector, x: float, y: float, z: float) -> float:
     """Return the speed of a point along n per unit of a column of the Jacobian."""
     speed = n[0] * (J[0] + J[4] * z - J[5] * y)
@@ -187,7 +187,7 @@ def speed_along(J: Vector, n: Vector, x: float, y: float, z: float) -> float:
     return speed
 
 
-@compiled
+@inner
 def greatest_approach(left: float, rate: float, braking: float, dt: float) -> float:
     """Return how far a point may come nearer in dt seconds with so much left, m.
 

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from wbc_suite.compiling import compiled_inline, struct
+from wbc_suite.compiling import inner, struct
 from wbc_suite.linear_algebra import copy_rows, dot, row_space, subtract_projection
 from wbc_suite.qp.active_set import QpArrays
 from wbc_suite.qp.problem import UNBOUNDED
@@ -31,7 +31,7 @@ class LevelArrays(NamedTuple):
     kept_counts: Indices  # (2,), its size, and the greatest rank so far
 
 
-@compiled_inline
+@inner
 def restrict_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
     """State that level k may move in ways that all levels above rate like their step.
 
@@ -58,7 +58,7 @@ def restrict_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
         qp.lower[nv + row] = -UNBOUNDED if row < p else y
 
 
-@compiled_inline
+@inner
 def _decided_directions(rows: Matrix, V: Matrix, level: LevelArrays) -> int:
     """Write an orthonormal basis of what the levels above decide; return its size.
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inline, struct
+from wbc_suite.compiling import compiled, inner, struct
 from wbc_suite.kinematics.forward import (
     RobotArrays,
     compute_com,
@@ -55,7 +55,7 @@ class TaskArrays(NamedTuple):
     all_finite: Vector  # (1,), output: set to 0 if a target is not finite
 
 
-@compiled_inline
+@inner
 def write_tasks(
     robot: RobotArrays, tasks: TaskArrays, dt: float, damping: float, curvature: float
 ) -> bool:
@@ -128,7 +128,7 @@ def frame_error(
         error[:] = np.nan
 
 
-@compiled
+@inner
 def relative_rotation(T: Vector, target: Vector, out: Matrix) -> bool:
     """Write `R_wf^T R_wt`, or I for a target that is not finite; return if it is.
 
@@ -161,7 +161,7 @@ def com_error(
         error[i] = target[i] - robot.com[i]
 
 
-@compiled
+@inner
 def _weigh_rows(
     tasks: TaskArrays, t: int, support: Indices, dt: float
 ) -> tuple[float, float]:
@@ -203,7 +203,7 @@ def _weigh_rows(
     return bending, total
 
 
-@compiled
+@inner
 def _write_joint_tasks(robot: RobotArrays, tasks: TaskArrays, dt: float) -> None:
     """Write the diagonal: squared costs, and squared costs times saturated steps."""
     q, q_index, diagonal = robot.q, tasks.q_index, tasks.diagonal

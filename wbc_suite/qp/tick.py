@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inline, struct
+from wbc_suite.compiling import compiled, inner, struct
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.qp.active_set import QpArrays, solve_warm
@@ -131,7 +131,7 @@ def finish_level(tick: TickArrays, k: int, dt: float, kept: bool) -> None:
             tick.pressure_damping[0] = max(tick.pressure_damping[0], pressure)
 
 
-@compiled_inline
+@inner
 def _begin_tick(tick: TickArrays, dt: float) -> bool:
     """Write bounds and limit rows; return whether the configuration is finite."""
     robot, qp, total = tick.robot, tick.levels[0].qp, 0.0
@@ -149,7 +149,7 @@ def _begin_tick(tick: TickArrays, dt: float) -> bool:
     return True
 
 
-@compiled_inline
+@inner
 def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     """Write the rows of limits and equalities that have a kernel; relax all limits.
 
@@ -183,7 +183,7 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
         qp.lower[nv + p + row] = b[row]
 
 
-@compiled
+@inner
 def stiffness(tasks: TaskArrays) -> float:
     """Return the largest entry of H without damping, or 1."""
     stiffest, W = 1.0, tasks.W
@@ -195,7 +195,7 @@ def stiffness(tasks: TaskArrays) -> float:
     return stiffest
 
 
-@compiled
+@inner
 def _row_pressure(qp: QpArrays) -> float:
     """Return `sum |nu| max|A|` over the rows A that tasks press on with forces nu.
 
@@ -221,7 +221,7 @@ def _row_pressure(qp: QpArrays) -> float:
     return min(total, greatest)
 
 
-@compiled
+@inner
 def _violation(x: Vector, qp: QpArrays) -> float:
     """Return by how much x violates the bounds and rows of a problem."""
     size = qp.counts[0] + qp.counts[1]
@@ -231,7 +231,7 @@ def _violation(x: Vector, qp: QpArrays) -> float:
     return worst_violation(x, qp.rows[:size], qp.lower[:end], qp.upper[:end])
 
 
-@compiled
+@inner
 def _is_feasible(tick: TickArrays, k: int) -> bool:
     """Return whether a level's solution keeps its own rows and the first level's.
 

@@ -1,6 +1,6 @@
 """How far commands of whole-body inverse kinematics may lead their joints."""
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.loop.records import CompiledRecords
 from wbc_suite.control.part.spline_reference import SplineArrays, spline_end
 from wbc_suite.qp.limit import JointBounds, braking_step
@@ -30,7 +30,7 @@ def limit_steps(
         _brake(bounds, spline, v, min(excess / EXCESS - 1.0, 1.0))
 
 
-@compiled
+@inner
 def _limit_lead(
     bounds: JointBounds,
     spline: SplineArrays,
@@ -66,7 +66,7 @@ def _limit_lead(
     return excess
 
 
-@compiled
+@inner
 def _brake(bounds: JointBounds, spline: SplineArrays, v: Vector, share: float) -> None:
     """Brake all commands by a share of their greatest accelerations.
 

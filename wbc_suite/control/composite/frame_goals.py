@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.compiling import as_argument, compiled, inner, struct
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.frame_targets import (
     FrameArrays,
@@ -87,7 +87,7 @@ def place_goals(
             _multiply(correction, pose, out)
 
 
-@compiled
+@inner
 def _multiply(A: Vector, B: Vector, out: Vector) -> None:
     """Write the pose `A B`."""
     for row in range(0, 12, 4):
@@ -97,7 +97,7 @@ def _multiply(A: Vector, B: Vector, out: Vector) -> None:
                 out[row + j] += A[row + k] * B[4 * k + j]
 
 
-@compiled
+@inner
 def _write_inverse_root(root: Vector, out: Vector) -> None:
     """Write the inverse of a pose that is given as position and quaternion w x y z."""
     w, x, y, z = root[3], root[4], root[5], root[6]
@@ -114,7 +114,7 @@ def _write_inverse_root(root: Vector, out: Vector) -> None:
             out[row + 3] -= out[row + k] * root[k]
 
 
-@compiled
+@inner
 def _bound(goal: Vector, home: Vector, limits: Vector) -> None:
     """Move a goal towards home until it is within limits, m and rad."""
     turn, vector, R = np.empty((3, 3)), np.empty(3), np.empty((3, 3))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import as_argument, compiled, compiled_inline, struct
+from wbc_suite.compiling import as_argument, compiled, inner, struct
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.part.approach import approach_speed, step_share
 from wbc_suite.kinematics import Configuration
@@ -80,7 +80,7 @@ class PostureArrays(NamedTuple):
     braking: Vector
 
 
-@compiled_inline
+@inner
 def write_targets(
     robot: RobotArrays,
     frames: FrameArrays,
@@ -108,7 +108,7 @@ def write_targets(
     return error
 
 
-@compiled
+@inner
 def lower_level_rate(error: float, half_speed_error: float) -> float:
     """Return the fraction of its speed that a lower level may use, 0 to 1.
 
@@ -147,7 +147,7 @@ def measure_frames(robot: RobotArrays, frames: FrameArrays) -> float:
     return worst
 
 
-@compiled
+@inner
 def write_turn(start: Vector, end: Vector, turn: Matrix) -> None:
     """Write the rotation from a pose to another in the axes of the first, (3, 3)."""
     for i in range(3):
@@ -156,7 +156,7 @@ def write_turn(start: Vector, end: Vector, turn: Matrix) -> None:
             turn[i, j] += start[4 + i] * end[4 + j] + start[8 + i] * end[8 + j]
 
 
-@compiled
+@inner
 def write_frame_pose(joint: Vector, offset: Vector, pose: Vector) -> None:
     """Write the pose of a frame from its joint's, which has R column by column."""
     for i in range(3):
@@ -166,7 +166,7 @@ def write_frame_pose(joint: Vector, offset: Vector, pose: Vector) -> None:
                 pose[4 * i + j] += joint[3 * n + i] * offset[4 * n + j]
 
 
-@compiled
+@inner
 def _write_frame_targets(frames: FrameArrays, dt: float, rate: float) -> None:
     """Write targets: position on a straight line, orientation about one axis.
 
@@ -187,7 +187,7 @@ def _write_frame_targets(frames: FrameArrays, dt: float, rate: float) -> None:
                 out[j] = row[0] * turn[0, j] + row[1] * turn[1, j] + row[2] * turn[2, j]
 
 
-@compiled
+@inner
 def _write_posture_target(
     robot: RobotArrays, posture: PostureArrays, settling: float, rate: float
 ) -> None:

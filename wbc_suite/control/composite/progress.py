@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inline, struct
+from wbc_suite.compiling import compiled, inner, struct
 from wbc_suite.control.composite.frame_targets import (
     FrameArrays,
     PostureArrays,
@@ -145,7 +145,7 @@ def watch_progress(
     return Event.NONE.value
 
 
-@compiled
+@inner
 def _is_far(frames: FrameArrays, far: Vector) -> bool:
     """Return whether a frame of level 0 is farther from its goal, m or rad."""
     for k in range(frames.level.shape[0]):
@@ -155,7 +155,7 @@ def _is_far(frames: FrameArrays, far: Vector) -> bool:
     return False
 
 
-@compiled_inline
+@inner
 def _is_stuck(
     progress: ProgressArrays, robot: RobotArrays, frames: FrameArrays
 ) -> bool:

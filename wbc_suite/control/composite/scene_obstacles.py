@@ -7,7 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from wbc_suite.compiling import as_argument, compiled, compiled_inline, struct
+from wbc_suite.compiling import as_argument, compiled, inner, struct
 from wbc_suite.control.composite.commanded_scene import (
     CommandedArrays,
     CommandedScene,
@@ -175,7 +175,7 @@ class SceneObstacles:
                 write_plane(self.argument, row, distance)
 
 
-@compiled_inline
+@inner
 def measure_obstacles(scene: SceneArrays) -> None:
     """Write the planes between the robot and the obstacles that are nearest to it."""
     place_commanded(scene.commanded)
@@ -211,7 +211,7 @@ def list_nearest(scene: SceneArrays) -> None:
                 insert_nearest(found[: last + 1], bound[: last + 1], last, pair, d)
 
 
-@compiled
+@inner
 def _least_distance(scene: SceneArrays, pair: int, most: float) -> float:
     """Return a lower bound of the distance of a pair, m; `most` or more where greater.
 
@@ -240,7 +240,7 @@ def _least_distance(scene: SceneArrays, pair: int, most: float) -> float:
     return least
 
 
-@compiled
+@inner
 def _rows_of_body(scene: SceneArrays, pair: int, count: int) -> tuple[int, int]:
     """Return how many rows a pair's body and obstacle have, and the last of them."""
     kept, last = 0, 0
@@ -277,7 +277,7 @@ def write_plane(scene: SceneArrays, row: int, distance: float) -> None:
         limit.plane[row, 3] += limit.plane[row, i] * at
 
 
-@compiled
+@inner
 def sliding_speed(scene: SceneArrays, pair: int) -> float:
     """Return how fast the robot's nearest point moves along the obstacle, m/s."""
     n, v, s = scene.normal[pair], scene.cvel[scene.own[pair]], scene.segment

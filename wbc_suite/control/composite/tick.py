@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inline, struct
+from wbc_suite.compiling import inner, struct
 from wbc_suite.control.composite.command_lead import limit_steps
 from wbc_suite.control.composite.finger_capsules import FingerArrays, place_fingers
 from wbc_suite.control.composite.frame_goals import GoalArrays, place_goals
@@ -107,7 +107,7 @@ Ticks: TypeAlias = Any
 without any, which leaves them out of the machine code."""
 
 
-@compiled_inline
+@inner
 def run_tick(
     tick: WholeBodyArrays,
     qpos: Vector,
@@ -149,7 +149,7 @@ def run_tick(
     return True
 
 
-@compiled
+@inner
 def _write_task_targets(tick: WholeBodyArrays) -> None:
     """Write the targets of frames and posture into the tasks of the stack."""
     frames, levels = tick.frames, tick.qp.levels

@@ -10,7 +10,7 @@ import numpy as np
 from wbc_suite.compiling import (
     announced,
     as_argument,
-    as_pointer,
+    by_address,
     compiled,
     plain,
     readable,
@@ -203,7 +203,7 @@ class WholeBodyDynamics(NamedTuple):
         command: Forward, left (m/s), turn (rad/s), height (m), shape (4,).
         torque: Torques of contact forces and loads at the joints, J^T f, shape (n,).
         last_velocity: Velocity as measured at the last tick, shape (6 + n,).
-        planner: Says which feet stand and swing; `as_pointer` of a gait's kernel.
+        planner: Says which feet stand and swing; `by_address` of a gait's kernel.
         gait: Its numbers and state.
         measured: What its planner reads.
         plan: What it writes.
@@ -331,7 +331,7 @@ def _planner(planner: Planner, gait: Gait, *, feet: int) -> Planner:
     values = gait, make_measured(feet), np.zeros(4), 0.0, make_plan(feet)
     arguments = (as_argument(x) if isinstance(x, tuple) else x for x in values)
     with announced("the gait"):
-        return as_pointer(planner, *arguments)
+        return by_address(planner, *arguments)
 
 
 def _make_state(*, is_free: bool) -> Records:

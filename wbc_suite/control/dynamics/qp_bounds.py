@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import inner
 from wbc_suite.control.dynamics.arrays import EDGES, WholeBodyDynamics
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.locomotion.gait import GRAVITY
@@ -30,7 +30,7 @@ FASTEST = 1e4
 """rad/s^2."""
 
 
-@compiled
+@inner
 def write_bounds(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write the diagonal cost, and all bounds."""
     _write_costs(physics, body)
@@ -39,7 +39,7 @@ def write_bounds(physics: Physics, body: WholeBodyDynamics) -> None:
     _bound_torques(body)
 
 
-@compiled
+@inner
 def _write_costs(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write the cost of forces, and of joints away from their posture.
 
@@ -60,7 +60,7 @@ def _write_costs(physics: Physics, body: WholeBodyDynamics) -> None:
         qp.diagonal[1, edges + j] = cost * wanted
 
 
-@compiled
+@inner
 def _bound_forces(body: WholeBodyDynamics) -> None:
     """Bound the forces along edges by the load that a foot may carry."""
     qp, state, plan = body.qp, body.state[0], body.plan
@@ -78,7 +78,7 @@ def _bound_forces(body: WholeBodyDynamics) -> None:
                 qp.side[edge] = 0
 
 
-@compiled
+@inner
 def _bound_accelerations(physics: Physics, body: WholeBodyDynamics) -> None:
     """Bound accelerations so that joints stay within position and velocity limits.
 
@@ -98,7 +98,7 @@ def _bound_accelerations(physics: Physics, body: WholeBodyDynamics) -> None:
         qp.upper[edges + j] = max(min(high, FASTEST), low + 1e-3)
 
 
-@compiled
+@inner
 def _bound_torques(body: WholeBodyDynamics) -> None:
     """Write `tau = M_j a + h_j - B_j^T f` as rows of y, within the motors' limits."""
     terms, qp = body.terms, body.qp

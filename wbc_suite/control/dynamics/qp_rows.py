@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import inner
 from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
 from wbc_suite.control.dynamics.qp_bounds import write_bounds
 from wbc_suite.control.dynamics.terms import (
@@ -54,7 +54,7 @@ YIELDING_HEIGHT, YIELDING_HANDS = 0.1, 0.1
 """Parts of those of height and hands: turning hips needs bent knees."""
 
 
-@compiled
+@inner
 def state_qp(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write the QP of a tick; terms and plan are those of the tick."""
     for k in range(body.site.shape[0]):
@@ -76,13 +76,13 @@ def state_qp(physics: Physics, body: WholeBodyDynamics) -> None:
     write_bounds(physics, body)
 
 
-@compiled
+@inner
 def _write_foot_jacobian(physics: Physics, body: WholeBodyDynamics, k: int) -> None:
     link = int(physics.site_bodyid[body.site[k]])
     write_frame_terms(physics, body, link, body.measured.foot[k])
 
 
-@compiled
+@inner
 def _add_row(
     body: WholeBodyDynamics, row: int, A: Vector, wanted: float, weight: float
 ) -> None:
@@ -104,7 +104,7 @@ def _add_row(
     qp.e[row] = weight * (wanted - offset)
 
 
-@compiled
+@inner
 def _add_foot(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> int:
     """Add the rows of a foot that rests or swings; return the next row."""
     plan, terms, measured = body.plan, body.terms, body.measured
@@ -139,7 +139,7 @@ def _add_foot(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
     return row + count
 
 
-@compiled
+@inner
 def _free_roll(physics: Physics, body: WholeBodyDynamics, k: int, turn: Vector) -> None:
     """Take rotations about a foot's x axis out of its Jacobian, motion and error."""
     terms, x = body.terms, rotation(physics.site_xmat, body.site[k])[:, 0]
@@ -159,7 +159,7 @@ def _free_roll(physics: Physics, body: WholeBodyDynamics, k: int, turn: Vector) 
         turn[i] -= x[i] * error
 
 
-@compiled
+@inner
 def _yield(body: WholeBodyDynamics, least: float) -> float:
     """Return the part of a weight that remains near the edge of the feet.
 
@@ -172,7 +172,7 @@ def _yield(body: WholeBodyDynamics, least: float) -> float:
     return min(max(inside, least), 1.0)
 
 
-@compiled
+@inner
 def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
     """Add rows of the centre of mass and of angular momentum; return the next row.
 
@@ -208,7 +208,7 @@ def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
     return row + 6
 
 
-@compiled
+@inner
 def _add_tracked_root(body: WholeBodyDynamics, row: int) -> int:
     """Add the rows of the accelerations that a tracked root needs."""
     A, weights = np.zeros(body.dofs.shape[0]), body.state[0].root_weight
@@ -220,7 +220,7 @@ def _add_tracked_root(body: WholeBodyDynamics, row: int) -> int:
     return row + 6
 
 
-@compiled
+@inner
 def _add_upright(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> int:
     """Add the rows of a body that keeps its orientation in heading axes."""
     terms, gait = body.terms, body.gait.state[0]
@@ -241,7 +241,7 @@ def _add_upright(physics: Physics, body: WholeBodyDynamics, k: int, row: int) ->
     return row + 3
 
 
-@compiled
+@inner
 def _write_heading(yaw: float, R: Matrix) -> None:
     """Write a rotation about the vertical, shape (3, 3), into zeros."""
     R[0, 0] = R[1, 1] = np.cos(yaw)
@@ -249,7 +249,7 @@ def _write_heading(yaw: float, R: Matrix) -> None:
     R[0, 1], R[2, 2] = -R[1, 0], 1.0
 
 
-@compiled
+@inner
 def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> int:
     """Add the rows of a hand; return the next row."""
     terms, state, gait = body.terms, body.state[0], body.gait.state[0]
@@ -296,7 +296,7 @@ def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
     return row + 6
 
 
-@compiled
+@inner
 def _advance_reference(
     body: WholeBodyDynamics, k: int, R: Matrix, p: Vector, twist: Vector
 ) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.dynamics.arrays import Stage, WholeBodyDynamics
 from wbc_suite.control.dynamics.qp_rows import state_qp
 from wbc_suite.control.dynamics.terms import (
@@ -86,7 +86,7 @@ def solve_whole_body(physics: Physics, body: WholeBodyDynamics) -> bool:
     return False
 
 
-@compiled
+@inner
 def _hold_joints(physics: Physics, body: WholeBodyDynamics) -> None:
     """Ask for no contact forces, and for joints as they were at the fall; no QP."""
     qp, terms = body.qp, body.terms
@@ -121,7 +121,7 @@ def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
         body.last_velocity[i] = physics.qvel[body.dofs[i]]
 
 
-@compiled
+@inner
 def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
     """Estimate the wrench on each hand, and count it to the bias and to the weight.
 
@@ -172,7 +172,7 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
         measured.com_velocity[i] += rate[i] / mass
 
 
-@compiled
+@inner
 def _is_at_stop(physics: Physics, body: WholeBodyDynamics, k: int) -> bool:
     """Return whether the stop of a joint may soon act on the arm of a hand."""
     low, high, at_stop = body.limits[0], body.limits[1], False
@@ -184,7 +184,7 @@ def _is_at_stop(physics: Physics, body: WholeBodyDynamics, k: int) -> bool:
     return at_stop
 
 
-@compiled
+@inner
 def _missing_wrench(body: WholeBodyDynamics, k: int, residual: Vector) -> Vector:
     """Return the wrench at a hand that explains the residual of its arm, (6,).
 
@@ -207,7 +207,7 @@ def _missing_wrench(body: WholeBodyDynamics, k: int, residual: Vector) -> Vector
     return x
 
 
-@compiled
+@inner
 def _watch_fall(physics: Physics, body: WholeBodyDynamics) -> None:
     """Note when and why the robot falls."""
     state, gait = body.state[0], body.gait.state[0]

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from pydantic import NonNegativeFloat
 
-from wbc_suite.compiling import compiled, readable, struct
+from wbc_suite.compiling import compiled, inner, readable, struct
 from wbc_suite.control.dynamics.arrays import (
     Stage,
     WholeBodyDynamics,
@@ -242,14 +242,14 @@ def use_all_feet(sources: Sources) -> None:
         _use_feet(source)
 
 
-@compiled
+@inner
 def pass_commands(physics: Physics, sources: Sources) -> None:
     """Give the commands that laws computed from the believed state to the actuators."""
     if sources is not None:
         sources[0].true_ctrl[:] = physics.ctrl
 
 
-@compiled
+@inner
 def _read_sensors(source: StateSource) -> None:
     """Take a reading, and write the believed joints and the root as predicted.
 
@@ -281,7 +281,7 @@ def _read_sensors(source: StateSource) -> None:
         _write_root(source)
 
 
-@compiled
+@inner
 def _use_feet(source: StateSource) -> None:
     """Correct the estimated root by the feet that stand."""
     state, body = source.state[0], source.body
@@ -295,7 +295,7 @@ def _use_feet(source: StateSource) -> None:
     state.count += 1
 
 
-@compiled
+@inner
 def _observe_foot(source: StateSource, k: int) -> None:
     """Write where a foot is in the base; a ball rolls on while it stands."""
     body, estimate = source.body, source.estimate
@@ -313,7 +313,7 @@ def _observe_foot(source: StateSource, k: int) -> None:
     source.stands[k] = 1 if body.plan.load[k] > 0.0 else 0
 
 
-@compiled
+@inner
 def _take_reading(source: StateSource) -> None:
     """Write what the sensors read in this step."""
     state, qpos, qvel = source.state[0], source.true_qpos, source.true_qvel
@@ -341,7 +341,7 @@ def _take_reading(source: StateSource) -> None:
     source.last_R[:] = rotation(source.true_xmat, source.body.state[0].body)
 
 
-@compiled
+@inner
 def _write_root(source: StateSource) -> None:
     """Write the estimated root into the believed state; its spin is the gyroscope's."""
     state, estimate = source.state[0], source.estimate

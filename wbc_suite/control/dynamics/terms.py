@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.dynamics.arrays import EDGES, WholeBodyDynamics
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import (
@@ -35,7 +35,7 @@ def write_terms(physics: Physics, body: WholeBodyDynamics) -> None:
         terms.h[i] = physics.qfrc_bias[dofs[i]] - physics.qfrc_passive[dofs[i]]
 
 
-@compiled
+@inner
 def measure(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write what the planner reads, and the angular momentum.
 
@@ -76,7 +76,7 @@ def measure(physics: Physics, body: WholeBodyDynamics) -> None:
         measured.rise[k] = terms.velocity[2]
 
 
-@compiled
+@inner
 def _measure_base(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write place and motion of the base as those of the centre of mass and heading."""
     gait, terms, measured = body.gait.state[0], body.terms, body.measured
@@ -88,7 +88,7 @@ def _measure_base(physics: Physics, body: WholeBodyDynamics) -> None:
     terms.com[:], measured.com_velocity[:] = p, terms.velocity[:3]
 
 
-@compiled
+@inner
 def foot_middle(physics: Physics, body: WholeBodyDynamics, k: int) -> Vector:
     """Return the middle of a foot's contact, world axes, m, shape (3,)."""
     site = body.site[k]
@@ -119,7 +119,7 @@ def write_frame_terms(
         terms.velocity[i] = dot(terms.J[i], terms.v, terms.v.shape[0])
 
 
-@compiled
+@inner
 def write_edges(physics: Physics, body: WholeBodyDynamics, k: int) -> None:
     """Write the generalised forces of a foot's friction pyramids.
 
@@ -156,7 +156,7 @@ def write_edges(physics: Physics, body: WholeBodyDynamics, k: int) -> None:
             row[j] = total
 
 
-@compiled
+@inner
 def eliminate_root(body: WholeBodyDynamics) -> None:
     """Write [X | x] with `a_root = X y + x`: the root's six equations of motion.
 

@@ -6,7 +6,7 @@ the accelerations that their laws ask for; here is what root and centre of mass 
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import inner
 from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import matrix_product, rotated, rotation
@@ -15,7 +15,7 @@ from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.typing import Matrix, Vector
 
 
-@compiled
+@inner
 def track_motion(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write the accelerations of root and centre of mass that track the motion.
 
@@ -42,7 +42,7 @@ def track_motion(physics: Physics, body: WholeBodyDynamics) -> None:
     plan.margin[0] = 1.0
 
 
-@compiled
+@inner
 def _write_root_errors(
     physics: Physics,
     body: WholeBodyDynamics,
@@ -74,7 +74,7 @@ def _write_root_errors(
     acceleration[3:6] = change[3:]
 
 
-@compiled
+@inner
 def _write_joint_errors(
     physics: Physics,
     body: WholeBodyDynamics,
@@ -93,7 +93,7 @@ def _write_joint_errors(
         acceleration[6 + j] = a + s * jerk
 
 
-@compiled
+@inner
 def _write_rotation(quaternion: Vector, R: Matrix) -> None:
     """Write the rotation of a unit quaternion xyzw, shape (3, 3)."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]

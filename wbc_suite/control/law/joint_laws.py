@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.law.reference import reference_at
 from wbc_suite.control.loop.physics import Physics
@@ -15,7 +15,7 @@ from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 
-@compiled
+@inner
 def joint_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> None:
     """Write `a* + kp (q* - q) + kd (v* - v)` of each joint; see `JointLaw`."""
     for j in range(law.first, law.last):
@@ -53,7 +53,7 @@ def base_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) ->
     _track(physics, yaw, yaw.position, turn, turn_rate)
 
 
-@compiled
+@inner
 def _track(
     physics: Physics, drive: CompiledRecords, q: float, v: float, a: float
 ) -> None:
@@ -64,7 +64,7 @@ def _track(
     physics.acceleration[drive.dof] = a + correction
 
 
-@compiled
+@inner
 def _commanded_velocity(
     law: CompiledRecords, drive: CompiledRecords
 ) -> tuple[float, float]:
@@ -73,7 +73,7 @@ def _commanded_velocity(
     return velocity, drive.acceleration if law.since <= law.duration else 0.0
 
 
-@compiled
+@inner
 def _integrate(physics: Physics, drive: CompiledRecords, v: float) -> None:
     """Move a reference by one step, near its joint and within the joint's range."""
     q = physics.qpos[drive.qpos]

@@ -5,11 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.law.law import Law
-from wbc_suite.control.law.osc_saturation import keep_direction
 from wbc_suite.control.law.pose_interpolation import interpolate_pose, pose_vector
-from wbc_suite.control.loop.acceleration_limits import limit_accelerations
 from wbc_suite.control.loop.physics import OscWork, Physics
 from wbc_suite.control.loop.records import CompiledRecords, LawKind
 from wbc_suite.control.loop.rigid_body import (
@@ -116,7 +114,7 @@ class OscLaw(Law):
 
 @compiled
 def osc_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> None:
-    """Write the joint accelerations of `OscLaw`, within the joints' limits.
+    """Write the joint accelerations of `OscLaw`.
 
     With `M = C C^T` and `z = C^T (a - a0)` the law is the shortest z with
 
@@ -138,12 +136,9 @@ def osc_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> 
     solve_upper(C, z, n)
     for j in range(n):
         physics.acceleration[work.dofs[j]] = posture[j] + z[j]
-    if law.keep_direction > 0.0:
-        keep_direction(physics, law, drives)
-    limit_accelerations(physics, law, drives)
 
 
-@compiled
+@inner
 def write_hand_task(
     physics: Physics, law: CompiledRecords, drives: CompiledRecords
 ) -> None:
@@ -165,7 +160,7 @@ def write_hand_task(
     cholesky(work.C, n, 0.0)
 
 
-@compiled
+@inner
 def _write_damped_factors(
     Y: Matrix, n: int, L: Matrix, Q: Matrix, column: Vector
 ) -> None:
@@ -187,7 +182,7 @@ def _write_damped_factors(
             break
 
 
-@compiled
+@inner
 def _write_site_jacobian(physics: Physics, law: CompiledRecords, n: int) -> None:
     """Write the site's Jacobian; subtract what other joints add from `wanted`.
 
@@ -216,7 +211,7 @@ def _write_site_jacobian(physics: Physics, law: CompiledRecords, n: int) -> None
         dof = int(physics.dof_parentid[dof])
 
 
-@compiled
+@inner
 def _write_task_acceleration(physics: Physics, law: CompiledRecords) -> None:
     """Write `wanted = x'' - J' v`, and its part `pull = kd u` towards the goal."""
     work = physics.osc
@@ -238,7 +233,7 @@ def _write_task_acceleration(physics: Physics, law: CompiledRecords) -> None:
     _add_feedback(law, R_wb, error, twist, velocity, work)
 
 
-@compiled
+@inner
 def _add_feedback(
     law: CompiledRecords,
     R_wb: Matrix,

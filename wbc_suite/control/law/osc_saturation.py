@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import inner
 from wbc_suite.control.loop.acceleration_limits import acceleration_limits
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords
@@ -21,7 +21,7 @@ _SHORTEST = 1e-12
 """A shorter pull has no direction."""
 
 
-@compiled
+@inner
 def keep_direction(
     physics: Physics, law: CompiledRecords, drives: CompiledRecords
 ) -> None:
@@ -38,17 +38,15 @@ def keep_direction(
                     0 <= h_i <= || kd u_i ||_L
 
     with `x_i = kd u_i / || kd u_i ||_L`, the linear and the angular half of u, and the
-    inertia L at the hand as norm. Nothing changes when a and tau are within their
-    limits, nor when these contradict each other. In the variable `y = (C^T b, h)` the
-    norms are `|| J b ||_L = || Q y_b ||`, `|| x ||_L = || L^-1 x ||`, `b^T M b = y_b^T
-    y_b`; with the cost's factor R, `R^T y` is the least change within bounds. The
-    factors C, L and Q are those of `osc_law`.
+    inertia L at the hand as norm. Nothing changes where the limits contradict each
+    other. In the variable `y = (C^T b, h)` the norms are `|| J b ||_L = || Q y_b ||`,
+    `|| x ||_L = || L^-1 x ||`, `b^T M b = y_b^T y_b`; with the cost's factor R, `R^T y`
+    is the least change within bounds. The factors C, L and Q are those of `osc_law`,
+    the bounds those of `is_saturated`.
     """
     n, work = law.last - law.first, physics.osc
     size, C, x = n + 2, work.C, work.z
     low, high = work.low, work.high
-    if not _write_room(physics, law, drives, low, high):
-        return
     R = _cost_factor(work.Q, n, work.L, work.pull, high)
     rows = _bounded_rows(C, n, R, low, high)
     count, scratch = rows.shape[0], np.empty((3 * size + 4, size))
@@ -59,18 +57,15 @@ def keep_direction(
             physics.acceleration[drives[law.first + j].dof] += x[j]
 
 
-@compiled
-def _write_room(
-    physics: Physics,
-    law: CompiledRecords,
-    drives: CompiledRecords,
-    low: Vector,
-    high: Vector,
+@inner
+def is_saturated(
+    physics: Physics, law: CompiledRecords, drives: CompiledRecords
 ) -> bool:
-    """Write the room of accelerations, then of torques; return whether a must change.
+    """Return whether the accelerations that a law asks for leave its limits.
 
-    Shapes (2 n,) or longer.
+    Writes the room of accelerations, then of torques, in `physics.osc`.
     """
+    low, high = physics.osc.low, physics.osc.high
     n = law.last - law.first
     multiply_inertia(physics, physics.acceleration, physics.force)
     is_violated = False
@@ -89,7 +84,7 @@ def _write_room(
     return is_violated
 
 
-@compiled
+@inner
 def _cost_factor(Q: Matrix, n: int, L: Matrix, pull: Vector, high: Vector) -> Matrix:
     """Return the Cholesky factor of the cost of y; write the upper bounds of h."""
     size = n + 2
@@ -116,7 +111,7 @@ def _cost_factor(Q: Matrix, n: int, L: Matrix, pull: Vector, high: Vector) -> Ma
     return R
 
 
-@compiled
+@inner
 def _bounded_rows(C: Matrix, n: int, R: Matrix, low: Vector, high: Vector) -> Matrix:
     """Return the bounded rows in terms of `R^T y`, of length 1; scale their bounds."""
     size = R.shape[0]

@@ -3,14 +3,14 @@
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import inner
 from wbc_suite.control.loop.records import CompiledRecords
 from wbc_suite.control.loop.rigid_body import matrix_product
 from wbc_suite.qp.lie import exp3
 from wbc_suite.typing import Matrix, Vector
 
 
-@compiled
+@inner
 def interpolate_pose(
     law: CompiledRecords,
     R_wb: Matrix,

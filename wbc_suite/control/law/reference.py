@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import inner
 from wbc_suite.control.loop.records import CompiledRecords
 from wbc_suite.typing import Matrix
 
 
-@compiled
+@inner
 def reference_at(
     law: CompiledRecords, drive: CompiledRecords
 ) -> tuple[float, float, float]:
@@ -20,7 +20,7 @@ def reference_at(
     return position, v + s * (a + 0.5 * s * j), a + s * j
 
 
-@compiled
+@inner
 def set_reference(
     record: CompiledRecords, drives: CompiledRecords, motion: Matrix
 ) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords
 
@@ -10,7 +10,7 @@ RATE = 50.0
 """1/s; fastest exponential approach to a limit, and return from beyond it."""
 
 
-@compiled
+@inner
 def limit_accelerations(
     physics: Physics, law: CompiledRecords, drives: CompiledRecords
 ) -> None:
@@ -45,7 +45,7 @@ def acceleration_limits(
     return lower, upper
 
 
-@compiled
+@inner
 def _greatest_acceleration(
     distance: float, velocity: float, drive: CompiledRecords
 ) -> float:

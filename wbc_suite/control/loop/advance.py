@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from wbc_suite.compiling import compiled_inline, compiled_nogil
+from wbc_suite.compiling import compiled_nogil, inner
 from wbc_suite.control.composite.tick import Ticks, run_tick
 from wbc_suite.control.dynamics.state_source import (
     Sources,
@@ -10,12 +10,8 @@ from wbc_suite.control.dynamics.state_source import (
     read_all_sensors,
     use_all_feet,
 )
-from wbc_suite.control.loop.inverse_dynamics import (
-    CustomLaw,
-    Needed,
-    WholeBodies,
-    write_commands,
-)
+from wbc_suite.control.loop.inverse_dynamics import WholeBodies, write_commands
+from wbc_suite.control.loop.kernels import LoopKernels
 from wbc_suite.control.loop.mujoco_functions import (
     mj_comPos,
     mj_kinematics,
@@ -31,7 +27,8 @@ from wbc_suite.control.loop.state_checks import (
 )
 
 
-def _advance(
+@compiled_nogil
+def advance(
     model: Any,
     data: Any,
     believed: Any,
@@ -39,8 +36,7 @@ def _advance(
     state: CheckedState,
     laws: CompiledRecords,
     drives: CompiledRecords,
-    hands: Needed,
-    custom_law: CustomLaw,
+    kernels: LoopKernels,
     bodies: WholeBodies,
     ticks: Ticks,
     sources: Sources,
@@ -59,8 +55,7 @@ def _advance(
         state: What is checked before the first and after the last step.
         laws: `LAW` records.
         drives: `DRIVE` records.
-        hands: Whether there are laws in operational space, see `needed_kernels`.
-        custom_law: Kernel of users' laws.
+        kernels: What the laws need.
         bodies: Robots on their feet.
         ticks: Whole-body ticks that run here.
         sources: Sensors of robots.
@@ -81,7 +76,7 @@ def _advance(
             mj_kinematics(model, believed)
             use_all_feet(sources)
             mj_step1(model, believed)
-        if not write_commands(physics, laws, drives, hands, custom_law, bodies):
+        if not write_commands(physics, laws, drives, kernels, bodies):
             break
         pass_commands(physics, sources)
         mj_step2(model, data)
@@ -92,12 +87,7 @@ def _advance(
     return done if check_after(state) else -1
 
 
-advance = compiled_nogil(_advance)
-advance_custom_laws = compiled_nogil(_advance, kept=False)
-"""The same where there are registered laws."""
-
-
-@compiled_inline
+@inner
 def _run_ticks(
     physics: Physics, laws: CompiledRecords, drives: CompiledRecords, ticks: Ticks
 ) -> bool:
@@ -110,7 +100,7 @@ def _run_ticks(
     return True
 
 
-@compiled_inline
+@inner
 def _count_down(ticks: Ticks) -> None:
     """Count the physics steps until the next ticks."""
     if ticks is not None:

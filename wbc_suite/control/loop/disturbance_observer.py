@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords, LawKind
 from wbc_suite.control.loop.rigid_body import multiply_inertia
@@ -57,7 +57,7 @@ def observe_disturbances(
                 drive.disturbance = estimate
 
 
-@compiled
+@inner
 def _write_deviation(
     physics: Physics, law: CompiledRecords, drives: CompiledRecords
 ) -> None:

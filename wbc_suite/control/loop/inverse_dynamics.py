@@ -9,42 +9,29 @@ forces of robots on their feet.
 
 from typing import Any, TypeAlias
 
-from wbc_suite.compiling import compiled, compiled_each_time
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.dynamics.arrays import Stage
-from wbc_suite.control.dynamics.solve_tick import solve_whole_body, write_whole_body
-from wbc_suite.control.law.custom import custom_kernel
-from wbc_suite.control.law.joint_laws import base_law, joint_law, velocity_law
-from wbc_suite.control.law.osc import osc_law
+from wbc_suite.control.law.osc_saturation import is_saturated
 from wbc_suite.control.law.reference import reference_at
 from wbc_suite.control.loop.acceleration_limits import limit_accelerations
-from wbc_suite.control.loop.disturbance_observer import observe_disturbances
+from wbc_suite.control.loop.kernels import LoopKernels
 from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import CompiledRecords, LawKind, Records
+from wbc_suite.control.loop.records import CompiledRecords, LawKind
 from wbc_suite.control.loop.rigid_body import multiply_inertia
 
-_JOINT, _OSC = int(LawKind.JOINT), int(LawKind.OSC)
-_BASE, _VELOCITY = int(LawKind.BASE), int(LawKind.VELOCITY)
-_TORQUE, _SERVO = int(LawKind.TORQUE), int(LawKind.SERVO)
+_OSC, _TORQUE, _SERVO = int(LawKind.OSC), int(LawKind.TORQUE), int(LawKind.SERVO)
 _STATED = int(Stage.STATED)
-
-CustomLaw: TypeAlias = Any
-"""One kernel for all laws of users, see `control.law.custom`; None without any."""
 
 WholeBodies: TypeAlias = Any
 """A tuple of `WholeBodyDynamics`, one for each robot on its feet; None without any."""
 
-Needed: TypeAlias = bool | None
-"""True, or None to leave a group of laws out of the machine code: numba drops what
-depends on an argument that is None, which halves the time to compile."""
 
-
-@compiled_each_time
+@compiled
 def write_commands(
     physics: Physics,
     laws: CompiledRecords,
     drives: CompiledRecords,
-    hands: Needed,
-    custom_law: CustomLaw,
+    kernels: LoopKernels,
     bodies: WholeBodies,
 ) -> bool:
     """Write the commands of all actuators; runs between `mj_step1` and `mj_step2`.
@@ -54,12 +41,17 @@ def write_commands(
         this is called again.
     """
     if bodies is None:
-        ask_accelerations(physics, laws, drives, hands, custom_law, bodies)
+        ask_accelerations(physics, laws, drives, kernels, bodies)
     else:
         if bodies[0].state[0].stage == _STATED:  # else it goes on after Python
-            ask_accelerations(physics, laws, drives, hands, custom_law, bodies)
-        if not solve_bodies(physics, bodies):
+            ask_accelerations(physics, laws, drives, kernels, bodies)
+        done = True
+        for body in bodies:
+            done = kernels.solve_body(physics, body) and done
+        if not done:
             return False
+        for body in bodies:
+            kernels.write_body(physics, body)
     multiply_inertia(physics, physics.acceleration, physics.force)
     if bodies is not None:
         for body in bodies:
@@ -70,61 +62,34 @@ def write_commands(
     return True
 
 
-@compiled
-def solve_bodies(physics: Physics, bodies: WholeBodies) -> bool:
-    """Write accelerations and contact forces of robots on their feet, if all solve."""
-    done = True
-    for body in bodies:
-        done = solve_whole_body(physics, body) and done
-    if done:
-        for body in bodies:
-            write_whole_body(physics, body)
-    return done
-
-
-@compiled_each_time
+@inner
 def ask_accelerations(
     physics: Physics,
     laws: CompiledRecords,
     drives: CompiledRecords,
-    hands: Needed,
-    custom_law: CustomLaw,
+    kernels: LoopKernels,
     bodies: WholeBodies,
 ) -> None:
-    """Write the accelerations that the laws of all joints ask for.
+    """Write the accelerations that laws ask for, within the limits of their joints.
 
     Laws of hands build on those of the joints that carry them.
     """
-    observe_disturbances(physics, laws, drives, bodies)
+    kernels.observe(physics, laws, drives, bodies)
     physics.acceleration[:] = 0.0
-    for k in range(laws.shape[0]):
-        laws[k].since += physics.timestep
-        joint_space_law(physics, laws[k], drives)
-        if custom_law is not None:
-            custom_law(physics, laws[k], drives)
-    if hands is not None:
+    for hands in (False, True):
         for k in range(laws.shape[0]):
-            if laws[k].kind == _OSC:
-                osc_law(physics, laws[k], drives)
+            law = laws[k]
+            if not hands:
+                law.since += physics.timestep
+            if law.kernel > 0 and (law.kind == _OSC) == hands:
+                kernels.law[law.kernel](physics, law, drives)
+                if law.keep_direction > 0.0 and is_saturated(physics, law, drives):
+                    kernels.prepare()
+                    kernels.keep_direction(physics, law, drives)
+                limit_accelerations(physics, law, drives)
 
 
-@compiled
-def joint_space_law(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords
-) -> None:
-    """Write the accelerations of a law of joints, within the joints' limits."""
-    if law.kind == _JOINT:
-        joint_law(physics, law, drives)
-    elif law.kind == _VELOCITY:
-        velocity_law(physics, law, drives)
-    elif law.kind == _BASE:
-        base_law(physics, law, drives)
-    else:
-        return
-    limit_accelerations(physics, law, drives)
-
-
-@compiled
+@inner
 def write_law_commands(
     physics: Physics, law: CompiledRecords, drives: CompiledRecords
 ) -> None:
@@ -156,9 +121,3 @@ def write_law_commands(
         servo = drive.stiffness * physics.qpos[drive.qpos]
         servo += drive.damping * physics.qvel[dof]
         physics.ctrl[drive.ctrl] = (drive.command + servo) / drive.gain
-
-
-def needed_kernels(laws: Records) -> tuple[Needed, CustomLaw]:
-    """Return `hands` and `custom_law` of `write_commands` for a table of laws."""
-    kinds = laws["kind"]
-    return bool((kinds == LawKind.OSC).any()) or None, custom_kernel(kinds)

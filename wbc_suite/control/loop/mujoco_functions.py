@@ -11,7 +11,7 @@ import llvmlite.binding
 import mujoco
 from numba import types
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import inner
 from wbc_suite.typing import Vector
 
 _MODEL_AND_DATA = types.void(types.intp, types.intp)
@@ -36,7 +36,7 @@ def addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
     return model._address, data._address
 
 
-@compiled
+@inner
 def geom_distance(
     model: int, data: int, first: int, second: int, farthest: float, segment: Vector
 ) -> float:

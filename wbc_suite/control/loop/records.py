@@ -32,6 +32,7 @@ class LawKind(IntEnum):
 LAW = np.dtype(
     [
         ("kind", "i8"),  # LawKind
+        ("kernel", "i8"),  # place of its kernel in `LoopKernels`; 0: none
         ("first", "i8"),  # the law's joints are drives[first:last]
         ("last", "i8"),
         ("since", "f8"),  # s since the goal was set

@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import inner
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.typing import Indices, Matrix, Vector
 
 
-@compiled
+@inner
 def rotation(rotations: Matrix, k: int) -> Matrix:
     """Return a view of one of MuJoCo's rotation matrices, (n, 9), as shape (3, 3)."""
     return rotations[k].reshape((3, 3))
 
 
-@compiled
+@inner
 def matrix_product(A: Matrix, B: Matrix, out: Matrix) -> None:
     """Write A B, shapes (3, 3)."""
     for i in range(3):
@@ -21,7 +21,7 @@ def matrix_product(A: Matrix, B: Matrix, out: Matrix) -> None:
             out[i, j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
 
 
-@compiled
+@inner
 def rotated(R: Matrix, x: Vector) -> Vector:
     """Return R x, shape (3,)."""
     y = np.empty(3)
@@ -30,7 +30,7 @@ def rotated(R: Matrix, x: Vector) -> Vector:
     return y
 
 
-@compiled
+@inner
 def point_jacobian_column(
     physics: Physics, dof: int, body: int, p: Vector, column: Vector
 ) -> None:
@@ -49,7 +49,7 @@ def point_jacobian_column(
     column[3], column[4], column[5] = axis[0], axis[1], axis[2]
 
 
-@compiled
+@inner
 def point_velocity_and_drift(
     physics: Physics, body: int, p: Vector, velocity: Vector, drift: Vector
 ) -> None:
@@ -84,7 +84,7 @@ def point_velocity_and_drift(
         dof = physics.dof_parentid[dof]
 
 
-@compiled
+@inner
 def moves_body(physics: Physics, dof: int, body: int) -> bool:
     """Return whether a degree of freedom moves a body."""
     k = physics.body_last_dof[body]
@@ -93,7 +93,7 @@ def moves_body(physics: Physics, dof: int, body: int) -> bool:
     return k == dof
 
 
-@compiled
+@inner
 def write_inertia(physics: Physics, dofs: Indices, n: int, block: Matrix) -> None:
     """Write the inertia of the first n of some degrees of freedom, shape (n, n).
 
@@ -117,7 +117,7 @@ def write_inertia(physics: Physics, dofs: Indices, n: int, block: Matrix) -> Non
                 block[i, j] = block[j, i] = physics.M[k]
 
 
-@compiled
+@inner
 def multiply_inertia(physics: Physics, a: Vector, force: Vector) -> None:
     """Write `M a` of the whole scene into force, shape (nv,)."""
     force[:] = 0.0

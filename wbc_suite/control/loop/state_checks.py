@@ -5,7 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import compiled, inner, struct
 from wbc_suite.typing import Indices, Matrix, Vector
 
 LARGEST = float(mujoco.mjMAXVAL)
@@ -69,7 +69,7 @@ def check_after(state: CheckedState) -> bool:
     return _all_usable(state)
 
 
-@compiled
+@inner
 def _all_usable(state: CheckedState) -> bool:
     if not (is_usable(state.qpos, LARGEST) and is_usable(state.qvel, FASTEST)):
         return False

@@ -6,9 +6,7 @@ import numpy as np
 import pinocchio as pin
 from pydantic import model_validator
 
-from wbc_suite.compiling import compiled
 from wbc_suite.control.law.pose_interpolation import pose_vector, vector_pose
-from wbc_suite.control.loop.rigid_body import matrix_product
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.part_settings import (
     ROUNDING,
@@ -19,8 +17,6 @@ from wbc_suite.control.part.part_settings import (
     check_axes,
     limits_of,
 )
-from wbc_suite.linear_algebra import copy_rows
-from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 
@@ -118,9 +114,8 @@ class HandGoal:
 
     def step_to(self, target: pin.SE3, hand: Vector) -> Vector:
         """Return the step that moves the goal to a target, shape (6,)."""
-        start, step = hand if self._from_hand else self.vector, np.empty(6)
-        write_step(start, pose_vector(target), self._axes(), step)
-        return step
+        start = hand if self._from_hand else self.vector
+        return step_between(start, pose_vector(target), self._axes())
 
     def _axes(self) -> Matrix:
         """Return the axes of steps as columns, shape (3, 3)."""
@@ -129,7 +124,6 @@ class HandGoal:
         return self._reference_axes
 
 
-@compiled
 def step_pose(
     goal: Vector, step: Vector, hand: Vector, axes: Matrix, from_hand: bool
 ) -> bool:
@@ -137,71 +131,41 @@ def step_pose(
 
     See `HandGoal`; `from_hand` is whether components that move count from the hand.
     """
-    moves, start = False, np.zeros(6)
+    moved = np.abs(step) > ROUNDING
+    if not moved.any():
+        return False
     if from_hand:
-        write_step(goal, hand, axes, start)
-    for i in range(6):
-        if abs(step[i]) > ROUNDING:
-            moves = True
-        else:
-            start[i] = 0.0
-    if moves:
-        _move(goal, start, axes)
-        _move(goal, step, axes)
-    return moves
+        _move(goal, moved * step_between(goal, hand, axes), axes)
+    _move(goal, step, axes)
+    return True
 
 
-@compiled
-def write_step(start: Vector, target: Vector, axes: Matrix, step: Vector) -> None:
-    """Write the step along axes, shape (6,), that takes a pose to another."""
-    R, turn = np.empty((3, 3)), np.empty(3)
-    matrix_product(target[:9].reshape((3, 3)), start[:9].reshape((3, 3)).T, R)
-    log3(R, turn)
-    for i in range(3):
-        step[i] = step[3 + i] = 0.0
-        for k in range(3):
-            step[i] += axes[k, i] * (target[9 + k] - start[9 + k])
-            step[3 + i] += axes[k, i] * turn[k]
+def step_between(start: Vector, target: Vector, axes: Matrix) -> Vector:
+    """Return the step along axes, shape (6,), that takes a pose to another."""
+    turn = pin.log3(target[:9].reshape(3, 3) @ start[:9].reshape(3, 3).T)
+    return np.concatenate([(target[9:] - start[9:]) @ axes, turn @ axes])
 
 
-@compiled
 def _move(pose: Vector, step: Vector, axes: Matrix) -> None:
     """Move a pose by a step along axes."""
-    turn, R, R_moved = np.zeros(3), np.empty((3, 3)), np.empty((3, 3))
-    for i in range(3):
-        for k in range(3):
-            pose[9 + i] += axes[i, k] * step[k]
-            turn[i] += axes[i, k] * step[3 + k]
-    exp3(turn[0], turn[1], turn[2], R)
-    matrix_product(R, pose[:9].reshape((3, 3)), R_moved)
-    copy_rows(R_moved, pose[:9].reshape((3, 3)))
+    R = pose[:9].reshape(3, 3)
+    R[:] = pin.exp3(axes @ step[3:]) @ R
+    pose[9:] += axes @ step[:3]
 
 
-@compiled
 def bound_pose(pose: Vector, start: Vector, limits: Matrix) -> None:
     """Move a pose into the limits of a `HandGoal`, component by component."""
-    turn, R, turned = np.empty(3), np.empty((3, 3)), False
-    matrix_product(pose[:9].reshape((3, 3)), start[:9].reshape((3, 3)).T, R)
-    log3(R, turn)
-    for i in range(3):
-        pose[9 + i] = min(max(pose[9 + i], limits[0, i]), limits[1, i])
-        bounded = min(max(turn[i], limits[0, 3 + i]), limits[1, 3 + i])
-        turned, turn[i] = turned or bounded != turn[i], bounded
-    if turned:
-        exp3(turn[0], turn[1], turn[2], R)
-        matrix_product(R, start[:9].reshape((3, 3)), pose[:9].reshape((3, 3)))
+    pose[9:] = np.clip(pose[9:], limits[0, :3], limits[1, :3])
+    R, R_start = pose[:9].reshape(3, 3), start[:9].reshape(3, 3)
+    turn = pin.log3(R @ R_start.T)
+    bounded = np.clip(turn, limits[0, 3:], limits[1, 3:])
+    if (bounded != turn).any():
+        R[:] = pin.exp3(bounded) @ R_start
 
 
-@compiled
-def write_relative_pose(
-    R_base: Matrix, p_base: Vector, R: Matrix, p: Vector, pose: Vector
-) -> None:
-    """Write the pose (R, p) in the axes of a base, as a vector."""
-    matrix_product(R_base.T, R, pose[:9].reshape((3, 3)))
-    for i in range(3):
-        pose[9 + i] = 0.0
-        for k in range(3):
-            pose[9 + i] += R_base[k, i] * (p[k] - p_base[k])
+def relative_pose(R_base: Matrix, p_base: Vector, R: Matrix, p: Vector) -> Vector:
+    """Return the pose (R, p) in the axes of a base, as a vector."""
+    return np.concatenate([(R_base.T @ R).ravel(), (p - p_base) @ R_base])
 
 
 def _limits(given: Range | None, key: str) -> Matrix:

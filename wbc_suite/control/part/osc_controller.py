@@ -13,7 +13,7 @@ from wbc_suite.control.part.controller import PartController, PoseInput
 from wbc_suite.control.part.hand_goal import (
     HandGoal,
     HandSettings,
-    write_relative_pose,
+    relative_pose,
 )
 from wbc_suite.control.part.impedance import Gains, Impedance, ImpedanceSettings
 from wbc_suite.control.part.part_settings import (
@@ -95,7 +95,7 @@ class OscController(PartController[OscLaw]):
         self.config, self._state, size = config, state, config.size
         self._impedance = Impedance(part.name, AXES, config)
         self._goal, self._step = HandGoal(config), np.zeros(6)
-        self._hand_pose, (low, high) = np.zeros(12), self._goal.limits[:, :3]
+        low, high = self._goal.limits[:, :3]
         turn = np.full(3, FULL_TURN)
         least = np.concatenate([np.maximum(low, -REACH), -turn])[:size]
         greatest = np.concatenate([np.minimum(high, REACH), turn])[:size]
@@ -233,5 +233,4 @@ class OscController(PartController[OscLaw]):
 
     def _hand(self) -> Vector:
         """Return the pose of the hand in the reference; see `HandGoal`."""
-        write_relative_pose(*self._frames, self._hand_pose)
-        return self._hand_pose
+        return relative_pose(*self._frames)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.compiling import as_argument, compiled, inner, struct
 from wbc_suite.control.memory import Parts
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays
@@ -171,7 +171,7 @@ def extend_spline(spline: SplineArrays, v: Vector) -> None:
     spline.since[0] = 0.0
 
 
-@compiled
+@inner
 def spline_end(spline: SplineArrays, j: int) -> tuple[float, float]:
     """Return position and velocity of the j-th driven joint when a solve is due."""
     i = spline.v_index[j]
@@ -189,7 +189,7 @@ def _targets(spline: SplineArrays) -> Vector:
     return found
 
 
-@compiled
+@inner
 def _cubic(
     v_1: float, v_2: float, v_3: float, period: float
 ) -> tuple[float, float, float, float]:
@@ -202,14 +202,14 @@ def _cubic(
     )
 
 
-@compiled
+@inner
 def _append(rows: Matrix, new: Vector) -> None:
     """Drop the first row, and put a new one after the last."""
     copy_rows(rows[1:], rows)
     copy_vector(new, rows[-1])
 
 
-@compiled
+@inner
 def _write_mean(robot: RobotArrays, window: Matrix, out: Vector) -> None:
     """Write the mean of configurations, in the tangent space of the first."""
     count, total = window.shape[0], np.zeros(robot.jacobian.shape[0])

@@ -18,7 +18,7 @@ import numpy as np
 from wbc_suite.compat.robosuite.controllers.variable_impedance import (
     GainsFirstController,
 )
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.law.custom import law_kind, register_law
 from wbc_suite.control.law.osc import OscLaw, write_hand_task
 from wbc_suite.control.loop.physics import Physics
@@ -52,7 +52,7 @@ def coupled_osc_law(
     _write_accelerations(physics, law, drives, 6)
 
 
-@compiled
+@inner
 def _write_accelerations(
     physics: Physics, law: CompiledRecords, drives: CompiledRecords, size: int
 ) -> None:
@@ -92,7 +92,7 @@ def _write_accelerations(
         physics.acceleration[work.dofs[j]] = posture[j] + z[j]
 
 
-@compiled
+@inner
 def _times_inertia(
     Y: Any, n: int, first: int, size: int, given: Any, result: Any
 ) -> None:
