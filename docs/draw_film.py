@@ -8,7 +8,7 @@ from pathlib import Path
 
 import draw_benchmarks
 import draw_teleop
-from draw_walking import Walk
+from draw_walking import Walk, save_film
 from PIL import Image
 
 import wbc_suite
@@ -68,15 +68,7 @@ def main() -> None:
         for part in (teleoperation, walk, benchmark)
         for picture in part()
     ]
-    film[0].save(
-        FILE,
-        save_all=True,
-        append_images=film[1:],
-        duration=round(1000 / RATE),
-        loop=0,
-        quality=75,
-        method=6,
-    )
+    save_film(FILE, film, rate=RATE, quality=75)
 
 
 if __name__ == "__main__":

@@ -103,6 +103,15 @@ def side_by_side(pictures: list[Image.Image]) -> Image.Image:
     return Image.fromarray(np.concatenate([np.asarray(p) for p in pictures], axis=1))
 
 
+def save_film(
+    path: Path, film: list[Image.Image], *, rate: float, quality: int
+) -> None:
+    """Write pictures as a film that repeats, so many of them a second."""
+    duration = round(1000 / rate)  # ms
+    others = {"save_all": True, "append_images": film[1:], "loop": 0, "method": 6}
+    film[0].save(path, duration=duration, quality=quality, **others)
+
+
 def main() -> None:
     """Draw the film and the strip."""
     walks = [Walk(name) for name in ROBOTS]
@@ -121,15 +130,7 @@ def main() -> None:
     Image.fromarray(np.concatenate(rows)).save(
         IMAGES / "walking.jpg", quality=85, optimize=True
     )
-    film[0].save(
-        IMAGES / "walking.webp",
-        save_all=True,
-        append_images=film[1:],
-        duration=round(1000 / RATE),
-        loop=0,
-        quality=45,
-        method=4,
-    )
+    save_film(IMAGES / "walking.webp", film, rate=RATE, quality=45)
 
 
 if __name__ == "__main__":

@@ -5,25 +5,14 @@ import sys
 
 import pytest
 
-from wbc_suite.cli import main
-
 NOTHING = "No {} named '{}'. Did you mean '{}'"
 
 
-@pytest.fixture
-def command(monkeypatch, capsys, tmp_path):
-    """Run a command in an empty folder; give its exit code, output and errors."""
+@pytest.fixture(autouse=True)
+def folder(monkeypatch, tmp_path):
+    """An empty folder, from which modules are imported."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["wbc-suite", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return run
 
 
 BENCHMARK = NOTHING.format("benchmark", "Lif", "Lift")

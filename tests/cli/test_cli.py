@@ -12,7 +12,6 @@ from PIL import Image
 
 from wbc_suite.benchmark import BENCHMARKS
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE, Catalogue
-from wbc_suite.cli import main
 from wbc_suite.cli.demo import demo
 from wbc_suite.cli.options import robot_names
 from wbc_suite.robot import load_robot
@@ -23,21 +22,6 @@ FILES = [
     for folder in ("robots", "tasks", "controllers")
     for path in sorted((Catalogue().root / folder).rglob("*.toml"))
 ]
-
-
-@pytest.fixture
-def wbc_suite_command(monkeypatch, capsys):
-    """Run a command as the shell would; give its exit code, output and errors."""
-    monkeypatch.setenv(ENVIRONMENT_VARIABLE, "")
-
-    def run(*arguments: str | Path) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["wbc-suite", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return run
 
 
 @pytest.mark.slow
@@ -66,40 +50,40 @@ def test_importing_the_package_imports_nothing_heavy():
     assert output.startswith("False")
 
 
-def test_version_is_printed(wbc_suite_command):
-    assert wbc_suite_command("--version")[:2] == (0, "wbc-suite 0.1.0\n")
+def test_version_is_printed(command):
+    assert command("--version")[:2] == (0, "wbc-suite 0.1.0\n")
 
 
 @pytest.mark.slow
-def test_list_names_every_robot_and_component(wbc_suite_command):
-    code, out, _ = wbc_suite_command("list")
+def test_list_names_every_robot_and_component(command):
+    code, out, _ = command("list")
     assert code == 0
     for name in ("Panda", "GR1", "Tiago", "SpotWithArm", "RethinkMount"):
         assert name in out
 
 
-def test_list_of_one_kind_leaves_the_others_out(wbc_suite_command):
-    _, out, _ = wbc_suite_command("list", "bases")
+def test_list_of_one_kind_leaves_the_others_out(command):
+    _, out, _ = command("list", "bases")
     assert "RethinkMount" in out
     assert "planar" in out  # the root that a base brings
     assert "Panda" not in out
 
 
-def test_list_calls_benchmarks_as_users_do(wbc_suite_command):
-    _, out, _ = wbc_suite_command("list", "benchmarks")
+def test_list_calls_benchmarks_as_users_do(command):
+    _, out, _ = command("list", "benchmarks")
     assert all(name in out for name in BENCHMARKS)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: f"{p.parent.name}-{p.stem}")
-def test_every_file_of_the_catalogue_passes_its_check(wbc_suite_command, path):
-    code, out, err = wbc_suite_command("check", path)
+def test_every_file_of_the_catalogue_passes_its_check(command, path):
+    code, out, err = command("check", path)
     assert (code, err) == (0, "")
     assert "fine" in out
 
 
-def test_check_prints_what_an_import_inferred(wbc_suite_command):
+def test_check_prints_what_an_import_inferred(command):
     arm = EXAMPLES / "six_axis_arm.urdf"
-    code, out, _ = wbc_suite_command("check", arm)
+    code, out, _ = command("check", arm)
     lines = out.splitlines()
     assert code == 0
     assert [line.split()[0] for line in lines[1:] if line[2] != " "] == (
@@ -111,42 +95,42 @@ def test_check_prints_what_an_import_inferred(wbc_suite_command):
     )
     assert "            right_gripper: left_finger_joint" in lines
     assert "  hands     right: frame 'right_tcp' on link 'palm'" in lines
-    code, out, _ = wbc_suite_command("check", arm, "--json")
+    code, out, _ = command("check", arm, "--json")
     assert json.loads(out)["inferred"]["root"] == ["fixed, first link 'base'"]
 
 
-def test_the_export_as_mjcf_compiles_elsewhere(wbc_suite_command, tmp_path):
+def test_the_export_as_mjcf_compiles_elsewhere(command, tmp_path):
     file = tmp_path / "panda.xml"
-    assert wbc_suite_command("export", "Panda", "--to", "mjcf", "-o", file)[0] == 0
+    assert command("export", "Panda", "--to", "mjcf", "-o", file)[0] == 0
     assert mujoco.MjModel.from_xml_path(str(file)).nv == 9
 
 
-def test_a_urdf_comes_in_and_is_edited_as_toml(wbc_suite_command, tmp_path):
+def test_a_urdf_comes_in_and_is_edited_as_toml(command, tmp_path):
     urdf, toml = tmp_path / "panda.urdf", tmp_path / "panda.toml"
-    assert wbc_suite_command("export", "Panda", "--to", "urdf", "-o", urdf)[0] == 0
-    assert wbc_suite_command("export", urdf, "--to", "toml", "-o", toml)[0] == 0
-    code, out, _ = wbc_suite_command("check", toml)
+    assert command("export", "Panda", "--to", "urdf", "-o", urdf)[0] == 0
+    assert command("export", urdf, "--to", "toml", "-o", toml)[0] == 0
+    code, out, _ = command("check", toml)
     assert code == 0
     assert "8 dof" in out
 
 
 @pytest.mark.slow
-def test_a_folder_of_ones_own_is_seen(wbc_suite_command, tmp_path):
+def test_a_folder_of_ones_own_is_seen(command, tmp_path):
     robots = tmp_path / "robots"
     robots.mkdir()
     text = (Catalogue().root / "robots/panda.toml").read_text()
     (robots / "mine.toml").write_text(text.replace('"Panda"', '"Mine"'))
-    code, out, _ = wbc_suite_command("list", "robots", "--catalogue", tmp_path)
+    code, out, _ = command("list", "robots", "--catalogue", tmp_path)
     assert code == 0
     assert "Mine" in out
     assert str(tmp_path) in os.environ[ENVIRONMENT_VARIABLE]
 
 
 @pytest.mark.slow
-def test_render_writes_a_picture_of_the_size_asked_for(wbc_suite_command, tmp_path):
+def test_render_writes_a_picture_of_the_size_asked_for(command, tmp_path):
     file = tmp_path / "panda.png"
     size = ("--width", 120, "--height", 80)
-    assert wbc_suite_command("render", "Panda", "-o", file, *size)[0] == 0
+    assert command("render", "Panda", "-o", file, *size)[0] == 0
     picture = np.asarray(Image.open(file))
     assert picture.shape == (80, 120, 3)
     assert picture.std() > 10
@@ -168,13 +152,13 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_typo_in_any_file_is_told_in_one_line(wbc_suite_command, tmp_path, damage):
+def test_a_typo_in_any_file_is_told_in_one_line(command, tmp_path, damage):
     file, old, new, word = DAMAGES[damage]
     text = (Catalogue().root / file).read_text()
     assert old in text
     damaged = tmp_path / Path(file).name
     damaged.write_text(text.replace(old, new, 1))
-    code, out, err = wbc_suite_command("check", damaged)
+    code, out, err = command("check", damaged)
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
     assert damaged.name in err
@@ -182,54 +166,54 @@ def test_a_typo_in_any_file_is_told_in_one_line(wbc_suite_command, tmp_path, dam
 
 
 @pytest.mark.slow
-def test_describe_action_shows_every_slice_with_its_unit(wbc_suite_command):
-    code, out, _ = wbc_suite_command("describe-action", "Panda")
+def test_describe_action_shows_every_slice_with_its_unit(command):
+    code, out, _ = command("describe-action", "Panda")
     assert code == 0
     words = ["BASIC: 7 values", "0:6", "0.05 m 0.5 rad", "hold the present goal"]
     for word in (*words, "right_gripper", "-1 open .. 1 closed", "half closed"):
         assert word in out
     whole = ("--controller", "WHOLE_BODY_IK")
-    code, out, _ = wbc_suite_command("describe-action", "Panda", *whole)
+    code, out, _ = command("describe-action", "Panda", *whole)
     assert code == 0
     for word in ("right_hand", "0:6", "m rad", "go to the origin; hold_action holds"):
         assert word in out
-    code, out, _ = wbc_suite_command("describe-action", "PandaOmron")
+    code, out, _ = command("describe-action", "PandaOmron")
     assert code == 0
     for word in ("HYBRID_MOBILE_BASE: 12", "forward", "stands still", "base_mode"):
         assert word in out
 
 
-def test_a_json_controller_is_checked_against_its_robot(wbc_suite_command, tmp_path):
+def test_a_json_controller_is_checked_against_its_robot(command, tmp_path):
     file = tmp_path / "mine.json"
     file.write_text('{"type": "OSC_POSE", "kp": 100}')
-    code, out, _ = wbc_suite_command("check", file, "--robot", "Baxter")
+    code, out, _ = command("check", file, "--robot", "Baxter")
     assert code == 0
     assert "BASIC of right: UNCOUPLED_OSC_POSE, left: UNCOUPLED_OSC_POSE" in out
-    code, _, err = wbc_suite_command("check", file)
+    code, _, err = command("check", file)
     assert code == 2
     assert "name the robot" in err
     file.write_text('{"type": "OSC_POSE", "kpp": 100}')
-    code, _, err = wbc_suite_command("check", file, "--robot", "Baxter")
+    code, _, err = command("check", file, "--robot", "Baxter")
     assert code == 2
     assert "Did you mean 'kp'" in err
 
 
-def test_the_list_names_part_controllers_and_what_files_control(wbc_suite_command):
-    _, out, _ = wbc_suite_command("list", "controllers")
+def test_the_list_names_part_controllers_and_what_files_control(command):
+    _, out, _ = command("list", "controllers")
     for word in ("HYBRID_MOBILE_BASE", "JOINT_TORQUE", "STANCE", "right_hand"):
         assert word in out
     assert "pandaomron_basic" in out
 
 
 @pytest.mark.slow
-def test_grippers_and_bases_are_chosen_on_the_command_line(wbc_suite_command, tmp_path):
+def test_grippers_and_bases_are_chosen_on_the_command_line(command, tmp_path):
     parts = ("--gripper", "right=InspireRightHand, left=none", "--base", "NullMount")
-    code, out, _ = wbc_suite_command("describe-action", "Baxter", *parts)
+    code, out, _ = command("describe-action", "Baxter", *parts)
     assert code == 0
     assert "right_gripper" in out
     assert "left_gripper" not in out
     file = tmp_path / "baxter.toml"
-    code, *_ = wbc_suite_command("export", "Baxter", "--to", "toml", "-o", file, *parts)
+    code, *_ = command("export", "Baxter", "--to", "toml", "-o", file, *parts)
     assert code == 0
     robot = load_robot(file)
     assert list(robot.synergies) == ["right_gripper"]
@@ -238,11 +222,9 @@ def test_grippers_and_bases_are_chosen_on_the_command_line(wbc_suite_command, tm
 
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["WHOLE_BODY_IK", "WHOLE_BODY_MINK_IK"])
-def test_the_demo_tracks_and_writes_its_pictures(
-    wbc_suite_command, tmp_path, controller
-):
+def test_the_demo_tracks_and_writes_its_pictures(command, tmp_path, controller):
     arguments = ("--figures", 1, "-o", tmp_path, "--controller", controller)
-    code, out, _ = wbc_suite_command("demo", *arguments)
+    code, out, _ = command("demo", *arguments)
     assert code == 0
     worst = [float(x) for x in re.findall(r"([\d.]+) mm \(worst\)", out)]
     resting = [float(x) for x in re.findall(r"at rest ([\d.]+) mm", out)]
@@ -294,8 +276,8 @@ def _frame(film: Image.Image, number: int) -> Image.Image:
         ),
     ],
 )
-def test_a_mistake_gets_one_line_and_exit_code_2(wbc_suite_command, arguments, words):
-    code, out, err = wbc_suite_command(*arguments)
+def test_a_mistake_gets_one_line_and_exit_code_2(command, arguments, words):
+    code, out, err = command(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith("wbc-suite: ")
     assert err.count("\n") == 1
@@ -304,9 +286,9 @@ def test_a_mistake_gets_one_line_and_exit_code_2(wbc_suite_command, arguments, w
 
 
 @pytest.mark.slow
-def test_bench_times_steps_beside_raw_physics(wbc_suite_command, tmp_path):
+def test_bench_times_steps_beside_raw_physics(command, tmp_path):
     file = tmp_path / "bench.json"
-    code, out, _ = wbc_suite_command(
+    code, out, _ = command(
         *("bench", "Lift", "--actions", 10, "--camera", "agentview"),
         *("--size", 32, "--json", file),
     )

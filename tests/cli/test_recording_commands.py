@@ -1,28 +1,12 @@
 """The commands of recordings, as a person types them."""
 
 import shutil
-import sys
 
 import pytest
 from PIL import Image
 
-from wbc_suite.cli import main
 from wbc_suite.experts import EXPERTS
 from wbc_suite.recording import Dataset
-
-
-@pytest.fixture
-def command(monkeypatch, capsys):
-    """Run a command as the shell would; give its exit code, output and errors."""
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["wbc-suite", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return run
 
 
 @pytest.mark.slow
