@@ -88,6 +88,11 @@ class NutAssembly(ObjectBenchmark):
         upright = abs(self.states[name].rotation.item(2, 2))
         return upright > math.cos(self.config.tilt)
 
+    @property
+    def things(self) -> Sequence[str]:
+        """Names of the nuts of this episode."""
+        return self.sorting.active
+
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table, pegs and cameras."""
         table, pegs = self.config.table, self.config.pegs
