@@ -148,15 +148,18 @@ def table(rows: list[dict[str, Any]]) -> str:
     lines = [
         "| benchmark | robots | controller | seed | steps | return | success "
         "| hours (steps/s) | published return at as many steps (five seeds) "
-        "| published hours | date |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
+        "| published final return | published hours | date |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
         theirs = published(*(row[key] for key in KEY[:3]))
-        beside = hours = ""
+        beside = final = hours = ""
         if theirs:
-            each = [np.interp(row["steps"], theirs["steps"], r) for r in _equal(theirs)]
-            beside = f"{np.median(each):.0f} ({min(each):.0f} to {max(each):.0f})"
+            curves = _equal(theirs)
+            beside = _median(
+                [np.interp(row["steps"], theirs["steps"], r) for r in curves]
+            )
+            final = _median([r[-1] for r in curves])
             hours = (
                 f"{np.median(theirs['hours']):.0f} for {theirs['steps'][-1]:,} steps"
             )
@@ -165,11 +168,16 @@ def table(rows: list[dict[str, Any]]) -> str:
             f"| {row['benchmark']} | {row['robots']} | {row['controller']} "
             f"| {row['seed']} | {row['steps']:,} | {row['return']:.0f} "
             f"| {100 * row['success']:.0f} % | {row['hours']:.2f} ({rate:.0f}) "
-            f"| {beside} | {hours} | {row['date']} |"
+            f"| {beside} | {final} | {hours} | {row['date']} |"
         )
     machines = ", ".join(sorted({row["machine"] for row in rows}))
     commands = ", ".join(sorted({f"`{row['command']}`" for row in rows}))
     return "\n".join([*lines, "", f"Machine: {machines}. Commands: {commands}."])
+
+
+def _median(values: list[float]) -> str:
+    """Return the median and the range of values."""
+    return f"{np.median(values):.0f} ({min(values):.0f} to {max(values):.0f})"
 
 
 def _equal(theirs: dict[str, Any]) -> list[list[float]]:

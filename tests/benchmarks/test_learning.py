@@ -49,6 +49,15 @@ def test_published_curves_are_those_known_of_the_paper():
     assert learning.published("Lift", "UR5e", "OSC_POSE") is None
 
 
+def test_the_table_has_the_published_final_medians():
+    medians = {"Lift": 456, "Door": 462, "TwoArmPegInHole": 470}
+    lines = learning.table(learning.known_rows()).splitlines()
+    column = lines[0].split(" | ").index("published final return")
+    rows = [line.removeprefix("| ").split(" | ") for line in lines]
+    found = {(row[0], row[column].split()[0]) for row in rows if row[0] in medians}
+    assert found == {(name, str(median)) for name, median in medians.items()}
+
+
 def test_a_case_is_the_mean_of_its_seeds():
     rows = [row(1, 0.9), row(0, 0.7), row(0, 0.2, data="plain", checkpoints=1)]
     plain, both = cloning.table(rows).splitlines()[2:4]

@@ -56,6 +56,16 @@ def test_json_is_all_that_is_printed_and_policies_are_compared(tmp_path):
 
 
 @pytest.mark.slow
+def test_perturbations_are_cases_beside_the_usual_one(tmp_path):
+    command = [*SHORT, "--episodes", "1", "--json", "-o", str(tmp_path)]
+    command += ["--policy", "hold", "--perturb", "none", "--perturb", "camera"]
+    figures = json.loads(CliRunner().invoke(app, command).stdout)
+    assert [case["perturb"] for case in figures["cases"]] == ["", "camera"]
+    wrong = CliRunner().invoke(app, [*SHORT, "--perturb", "camra"])
+    assert isinstance(wrong.exception, UnknownNameError)
+
+
+@pytest.mark.slow
 def test_failures_are_filmed_into_the_report(tmp_path):
     command = [*SHORT, "--episodes", "2", "--films", "1", "-o", str(tmp_path)]
     found = CliRunner().invoke(app, command)

@@ -23,6 +23,7 @@ from wbc_suite.recording.converting import convert
 from wbc_suite.recording.converting.conversion import convert_piece
 from wbc_suite.recording.extracting import extract
 from wbc_suite.recording.replaying import divergence, play_states
+from wbc_suite.wrappers import DataCollection
 
 
 @pytest.mark.slow
@@ -92,6 +93,33 @@ def test_lerobots_layout_or_what_to_install(small_recording, tmp_path):
     assert stats["count"] == [20]
     with pytest.raises(DatasetError, match="not empty"):
         convert(small_recording, out, "lerobot")
+
+
+@pytest.mark.slow
+def test_tasks_of_lerobots_layout_are_the_instructions_of_episodes(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    path, told = tmp_path / "sorted.hdf5", []
+    env = DataCollection(wbc_suite.make("PickPlaceSingle", horizon=2), path)
+    for seed in range(6):
+        env.reset(seed=seed)
+        told.append(env.unwrapped.instruction)
+        for _ in range(2):
+            env.step(env.unwrapped.hold_action)
+    env.close()
+    out = convert(path, tmp_path / "out", "lerobot")
+    tasks = parquet.read_table(out / "meta/tasks.parquet").to_pydict()
+    assert tasks["task"] == sorted({*told})
+    assert len(tasks["task"]) > 2
+    (episodes,) = out.glob("meta/episodes/*/*.parquet")
+    rows = parquet.read_table(episodes).to_pylist()
+    assert [row["tasks"] for row in rows] == [[words] for words in told]
+    (frames,) = out.glob("data/*/*.parquet")
+    table = parquet.read_table(frames).to_pydict()
+    assert [tasks["task"][k] for k in table["task_index"]] == np.repeat(
+        told, 2
+    ).tolist()
+    info = json.loads((out / "meta/info.json").read_text())
+    assert info["total_tasks"] == len(tasks["task"])
 
 
 def test_lerobots_videos_have_a_frame_for_each_action(tmp_path):

@@ -97,6 +97,11 @@ class NutAssembly(ObjectBenchmark):
             and self.scene.upright(name, config.tilt, flipped=True)
         )
 
+    @property
+    def things(self) -> Sequence[str]:
+        """Names of the nuts of this episode."""
+        return self.sorting.active
+
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table, pegs and cameras."""
         table, pegs = self.config.table, self.config.pegs

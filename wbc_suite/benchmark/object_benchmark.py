@@ -1,13 +1,14 @@
 """Base of benchmarks with objects: placement, observations, grasps, rewards."""
 
 import math
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import mujoco
 import numpy as np
-from pydantic import PositiveInt
+from pydantic import PositiveInt, field_validator
 
 from wbc_suite import logs
 from wbc_suite.benchmark.arrangement import (
@@ -44,6 +45,7 @@ TRIES = 50
 """Placements that are drawn if a robot touches the objects of the first."""
 PRESSED = 1e-3  # depth from which an object is in the arena, and not on it, m
 PARKED = (8.0, 8.0)  # place of objects that are not used in an episode, m
+CAPITAL = r"(?<=[a-z])(?=[A-Z])"  # where a new word begins in a name
 BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 
@@ -53,6 +55,9 @@ class ObjectBenchmarkConfig(FrozenModel):
     Attributes:
         format: Version of the file format.
         title: The task in a few words.
+        instructions: Sentences that tell a policy what to do; `{things}` are the things
+            of the episode, `{their}` is "its" or "their", and `{s}` the plural's s.
+        paraphrases: Others with the same meaning, which recordings never use.
         horizon: Actions in an episode, at 20 actions a second.
         places: Position of each robot, m.
         one_table: Whether `table`, if there is one, is the only table.
@@ -66,10 +71,24 @@ class ObjectBenchmarkConfig(FrozenModel):
     format: Literal[1]
     name: str
     title: str
+    instructions: tuple[str, ...] = ()
+    paraphrases: tuple[str, ...] = ()
     horizon: PositiveInt
     places: Places
     arena: ArenaConfig | None = None
     placement: dict[str, Any] | None = None
+
+    @field_validator("instructions", "paraphrases")
+    @classmethod
+    def _can_be_filled_in(cls, given: tuple[str, ...]) -> tuple[str, ...]:
+        for words in given:
+            try:
+                in_words(words, ("Cube",))
+            except (LookupError, ValueError) as error:
+                raise ValueError(
+                    f"'{words}' may have {{things}}, {{their}} and {{s}} in braces"
+                ) from error
+        return given
 
 
 class ObjectBenchmark(ABC):
@@ -102,6 +121,24 @@ class ObjectBenchmark(ABC):
         self.name, self.title, self.horizon = config.name, config.title, config.horizon
         self._placement, self.arena = config, config.arena
         self.placement, self.sampler = config.placement, None
+
+    @property
+    def things(self) -> Sequence[str]:
+        """Names of what the robots are to put somewhere in this episode."""
+        return ()
+
+    def instruction(self, number: int, *, paraphrased: bool = False) -> str:
+        """Return what to do in this episode, in one of several wordings.
+
+        Args:
+            number: Of the wording, modulo how many there are.
+            paraphrased: Whether it is one that recordings never use.
+        """
+        config = self._placement
+        given = config.paraphrases if paraphrased else config.instructions
+        if not given:
+            return self.title
+        return in_words(given[number % len(given)], self.things)
 
     @abstractmethod
     def furnish(self, spec: mujoco.MjSpec) -> None:
@@ -311,3 +348,14 @@ class ObjectBenchmark(ABC):
         if name not in self._sites:
             self._sites[name] = self.data.site_xpos[self.model.site(name).id]
         return self._sites[name]
+
+
+def in_words(sentence: str, things: Sequence[str]) -> str:
+    """Fill the names of things into a sentence; see `instructions`."""
+    named = [f"the {re.sub(CAPITAL, ' ', name).lower()}" for name in things]
+    *others, last = named or [""]
+    return sentence.format(
+        things=f"{', '.join(others)} and {last}" if others else last,
+        their="their" if others else "its",
+        s="s" if others else "",
+    )

@@ -74,6 +74,11 @@ class PickPlace(ObjectBenchmark):
             stages=config.stages,
         )
 
+    @property
+    def things(self) -> Sequence[str]:
+        """Names of the objects of this episode."""
+        return self.sorting.active
+
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add bins, cameras, and translucent copies of the objects at their goals."""
         source, target = self.config.source, self.config.target

@@ -54,6 +54,13 @@ PoliciesOption = Annotated[
         show_default="random",
     ),
 ]
+PerturbOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="camera, light, colour, layout, start or wording, or none. Repeat to "
+        "compare.",
+    ),
+]
 BaseOption = Annotated[
     int,
     typer.Option(
@@ -102,6 +109,7 @@ def evaluate(
     robots: RobotsOption,
     policy: PoliciesOption,
     controller: ControllersOption = None,
+    perturb: PerturbOption = None,
     episodes: Annotated[int, typer.Option(min=1, help="Episodes per case.")] = 400,
     base_seed: BaseOption = 0,
     first_seed: FirstSeedOption = None,
@@ -139,7 +147,9 @@ def evaluate(
         arguments["horizon"] = horizon
     cases = [
         replace(case, record=record, action_time=action_time, episode_time=episode_time)
-        for case in _cases(benchmarks, robots, controller, policy, arguments=arguments)
+        for case in _cases(
+            benchmarks, robots, controller, policy, perturb, arguments=arguments
+        )
     ]
     items = {}
     for case in cases:
@@ -213,13 +223,17 @@ def _cases(
     robots: Sequence[str],
     controllers: Sequence[str] | None,
     policies: Sequence[str],
+    perturb: Sequence[str] | None,
     *,
     arguments: dict[str, str | int | float | bool],
 ) -> "list[Case]":
     """Return every combination; raise an error at once for an unknown name."""
     from wbc_suite.benchmark import BENCHMARKS
-    from wbc_suite.evaluation import Case
+    from wbc_suite.evaluation import PERTURBATIONS, Case
 
+    changes = ["" if name == "none" else name for name in perturb or ["none"]]
+    for name in filter(None, changes):
+        PERTURBATIONS.find(name)
     check_names(
         benchmarks=benchmarks,
         robots=sorted({*robot_names(robots)}),
@@ -229,16 +243,19 @@ def _cases(
     spelled = {
         name: BENCHMARKS.spelled(name) for name in benchmarks if name in BENCHMARKS
     }
-    every = itertools.product(policies, benchmarks, robots, controllers or [None])
+    every = itertools.product(
+        policies, benchmarks, robots, controllers or [None], changes
+    )
     return [
         Case(
             benchmark=spelled.get(benchmark, benchmark),
             robots=tuple(name.strip() for name in together.split(",")),
             controller=controller,
             policy=policy,
+            perturb=change,
             arguments=tuple(sorted(arguments.items())),
         )
-        for policy, benchmark, together, controller in every
+        for policy, benchmark, together, controller, change in every
     ]
 
 

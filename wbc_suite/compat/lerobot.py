@@ -53,7 +53,6 @@ class LeRobotEnv(gymnasium.Env[dict[str, Any], Any]):
         arguments = {"render_mode": "rgb_array"} | arguments
         self.env: RobotEnv = make(benchmark, **arguments)
         self.metadata, self.render_mode = self.env.metadata, self.env.render_mode
-        self.task = self.task_description = benchmark  # as in converted recordings
         self._max_episode_steps = self.env.horizon
         self._cameras = tuple(cameras)
         keys = [k for k in self.env.observation_space if k.endswith("proprio-state")]
@@ -61,6 +60,13 @@ class LeRobotEnv(gymnasium.Env[dict[str, Any], Any]):
         seen = self._view(self.env.reset(seed=0)[0])
         self.observation_space = _space_of(seen)
         self.action_space = self.env.action_space
+
+    @property
+    def task(self) -> str:
+        """The instruction of the episode, as in converted recordings."""
+        return self.env.instruction
+
+    task_description = task
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -2,6 +2,7 @@
 
 import copy
 import os
+import zlib
 from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wbc_suite.benchmark import Benchmark, load_benchmark
+from wbc_suite.benchmark import Benchmark, ObjectBenchmark, load_benchmark
 from wbc_suite.benchmark.base import ResumableBenchmark
 from wbc_suite.envs.building import (
     action_space,
@@ -62,6 +63,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         latency: Physics steps between a step's begin and its action taking effect; may
             exceed a control period.
         pushes: Forces on bodies in this episode, besides those of the benchmark.
+        paraphrased: Whether `instruction` has a wording that recordings never use.
     """
 
     metadata = {"render_modes": ["human", "rgb_array", "depth_array"], "render_fps": 20}
@@ -96,6 +98,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self._steps, self._broken, self.latency = 0, "", 0
         self.pushes: tuple[Push, ...] = ()
         self._begun, self._process = False, os.getpid()
+        self.paraphrased = False
         given = self.config.randomisation
         self._randomiser = None if given is None else given.bind(self)
         self._states = PhysicsStates(self.simulation, given, self.action_layout.size)
@@ -309,6 +312,14 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     def made_of(self) -> tuple[Any, dict[str, Any]]:
         """The benchmark and the arguments of this environment (a copy)."""
         return self._given[0], dict(self._given[1])
+
+    @property
+    def instruction(self) -> str:
+        """What to do in this episode, a sentence; its wording follows from the seed."""
+        number = zlib.crc32(repr(self.beginning[0]).encode())
+        if isinstance(self.benchmark, ObjectBenchmark):
+            return self.benchmark.instruction(number, paraphrased=self.paraphrased)
+        return self.benchmark.title
 
     @property
     def physics_state(self) -> Vector:

@@ -1,6 +1,11 @@
 """Policies, many episodes of them, and statistics that can be cited."""
 
 from wbc_suite.evaluation.comparison import Comparison, compare
+from wbc_suite.evaluation.perturbations import (
+    PERTURBATIONS,
+    Perturbation,
+    register_perturbation,
+)
 from wbc_suite.evaluation.policies import (
     POLICIES,
     Policy,
@@ -29,10 +34,12 @@ from wbc_suite.evaluation.statistics import (
 )
 
 __all__ = [
+    "PERTURBATIONS",
     "POLICIES",
     "Case",
     "Comparison",
     "ErrorKind",
+    "Perturbation",
     "Policy",
     "PolicyError",
     "PolicyServer",
@@ -46,6 +53,7 @@ __all__ = [
     "make_policy",
     "plan_rollouts",
     "probability_of_improvement",
+    "register_perturbation",
     "register_policy",
     "replicate",
     "run_rollouts",

@@ -98,6 +98,7 @@ def describe(env: RobotEnv, seed: int) -> dict[str, Any]:
     return {
         "seed": seed,
         "benchmark": str(benchmark),
+        "instruction": env.instruction,
         **{key: _plain(value) for key, value in arguments.items()},
         "action": {
             "parts": {p.name: [p.start, p.stop] for p in layout.slices},
@@ -129,7 +130,8 @@ def replicate(
     from wbc_suite.recording import EnvSource
 
     def begin(episode: Mapping[str, Any]) -> Policy:
-        given = {key: value for key, value in episode.items() if key != "action"}
+        told = "action", "instruction"
+        given = {key: value for key, value in episode.items() if key not in told}
         seed, benchmark = int(given.pop("seed")), str(given.pop("benchmark"))
         source = EnvSource(benchmark=benchmark, arguments=given)
         env = source.build(trust_files=trust_files)

@@ -139,6 +139,7 @@ def _comparisons(
     by_policy: dict[str, dict[str, Sequence[dict[str, Any]]]] = {}
     for case, episodes in played.items():
         scene = f"{case.benchmark} {'+'.join(case.robots)} {case.controller}"
+        scene += f" {case.perturb}"
         by_policy.setdefault(case.policy, {})[scene] = episodes
     first, *others = by_policy or [""]
     return {
@@ -155,6 +156,7 @@ def _case(case: Case) -> dict[str, Any]:
         "robots": list(case.robots),
         "controller": case.controller,
         "policy": case.policy,
+        "perturb": case.perturb,
     }
 
 

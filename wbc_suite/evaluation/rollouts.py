@@ -18,6 +18,7 @@ import numpy as np
 
 from wbc_suite.envs import RobotEnv, make
 from wbc_suite.errors import ConfigError, WbcError, shortened
+from wbc_suite.evaluation.perturbations import PERTURBATIONS, Perturbation
 from wbc_suite.evaluation.policies import Policy, make_policy
 from wbc_suite.evaluation.time_limit import TimeLimitExceeded, time_limit
 from wbc_suite.executors import WorkItem
@@ -33,13 +34,14 @@ class Case:
     Benchmark and controller are names or files. `arguments` are further ones of
     `wbc_suite.make`, plain JSON data, sorted. `action_time` and `episode_time` are the
     most wall time of the policy for an action (the first may compile), and of an
-    episode, s; 0 for no limit.
+    episode, s; 0 for no limit. `perturb` is one of `PERTURBATIONS`, "" for none.
     """
 
     benchmark: str
     robots: tuple[str, ...]
     controller: str | None = None
     policy: str = "random"
+    perturb: str = ""
     record: bool = False
     action_time: float = 60.0
     episode_time: float = 3600.0
@@ -49,7 +51,8 @@ class Case:
     def title(self) -> str:
         """The case in one line."""
         parts = (self.benchmark, "+".join(self.robots), self.controller, self.policy)
-        return " ".join(p for p in parts if p)
+        perturbed = f"with another {self.perturb}" if self.perturb else ""
+        return " ".join(p for p in (*parts, perturbed) if p)
 
 
 def plan_rollouts(
@@ -179,13 +182,18 @@ def _attempt(
 
 def make_case(payload: Mapping[str, Any], **more: Any) -> RobotEnv:
     """Make the environment of an item, with more arguments."""
-    return make(
+    name = payload["perturb"]
+    perturbation = PERTURBATIONS.find(name) if name else Perturbation(summary="nothing")
+    env = make(
         payload["benchmark"],
         robots=payload["robots"],
         controller_configs=payload["controller"] or None,
         **payload["arguments"],
+        **perturbation.arguments,
         **more,
     )
+    perturbation.change(env)
+    return env
 
 
 def run_episode(

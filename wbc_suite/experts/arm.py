@@ -1,5 +1,6 @@
 """One arm that an expert moves: the pose of its hand, its goal and its gripper."""
 
+import math
 from collections.abc import Sequence
 from functools import cache, partial
 
@@ -84,13 +85,14 @@ class Arm:
         grasp: str | None = None,
         *,
         after: Outlook | None = None,
+        most: float = math.inf,
     ) -> Outlook:
         """Look along a chain of poses of a grasp's frame, by default the present.
 
         See `LookAhead.along`.
         """
         chain = [(pose,) for pose in poses]
-        return self._look_ahead(grasp or self.grasp).along(chain, after)
+        return self._look_ahead(grasp or self.grasp).along(chain, after, most=most)
 
     def shares_joints(self, other: "Arm") -> bool:
         """Whether a joint moves the hands of both arms."""

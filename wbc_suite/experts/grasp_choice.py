@@ -2,8 +2,9 @@
 
 import itertools
 import math
+from bisect import insort
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
@@ -56,6 +57,7 @@ class Choice:
         away: Distance from there to the grasp, m.
         grasp: Pose T_oh of the hand in the object's frame.
         then: Chain of poses of the object that follows.
+        depth: How deep the robot gets in other things, m.
         cost: Of the outlook, with penalties.
     """
 
@@ -66,6 +68,7 @@ class Choice:
     grasp: pin.SE3
     then: tuple[pin.SE3, ...]
     outlook: Outlook
+    depth: float
     cost: float
 
     def hand_at(self, T_wo: pin.SE3) -> pin.SE3:
@@ -110,8 +113,9 @@ def choose_pair(
     decides among the `PAIRED` best of each.
     """
     shared = arms[0].shares_joints(arms[1])
+    several = {"count": PAIRED, "enough": 0.0} if shared else {}
     one, other = (
-        _ranked(cell, name, [arm], approach, [then], enough=0.0 if shared else GOOD)
+        _ranked(cell, name, [arm], approach, [then], **several)
         for arm, approach in zip(arms, approaches, strict=True)
     )
     if not one or not other:
@@ -143,20 +147,36 @@ def _ranked(
     then: Sequence[Sequence[pin.SE3]],
     costs: Sequence[float] | None = None,
     *,
+    count: int = 1,
     enough: float = GOOD,
 ) -> list[Choice]:
-    """Return grasps by cost, tilted ones too if none costs less than enough."""
+    """Return the best grasps by cost, tilted ones too if none costs less than enough.
+
+    What follows a grasp is left as soon as it costs more than `count` others.
+    """
     ways = [*zip(map(tuple, then), costs or [0.0] * len(then), strict=True)]
     found: list[Choice] = []
     for tilt in TILTS:
-        if found and min(choice.cost for choice in found) < enough:
+        if found and found[0].cost < enough:
             break
-        for arm in arms:
-            for site in cell.grasps(name):
-                if abs(tilt) <= site.tilt and site.name == approach.place:
-                    grasp = tilted(site, tilt)
-                    found += _choices(cell, name, arm, site, grasp, ways, approach)
-    return sorted(found, key=lambda choice: choice.cost)
+        begun = [
+            choice
+            for arm in arms
+            for site in cell.grasps(name)
+            if abs(tilt) <= site.tilt and site.name == approach.place
+            for choice in _begin(cell, name, arm, site, tilted(site, tilt), approach)
+        ]
+        for choice in sorted(begun, key=_cost):
+            for way, extra in ways:
+                most = found[count - 1].cost if len(found) >= count else math.inf
+                whole = _follow(cell, name, choice, way, extra, most, approach.leave)
+                if whole is not None:
+                    insort(found, whole, key=_cost)
+    return found
+
+
+def _cost(choice: Choice) -> float:
+    return choice.cost
 
 
 def tilted(site: GraspSite, tilt: float) -> pin.SE3:
@@ -166,16 +186,15 @@ def tilted(site: GraspSite, tilt: float) -> pin.SE3:
     return pin.SE3(turn @ pose.rotation, pose.translation)
 
 
-def _choices(
+def _begin(
     cell: Workcell,
     name: str,
     arm: Arm,
     site: GraspSite,
     grasp: pin.SE3,
-    ways: Sequence[tuple[tuple[pin.SE3, ...], float]],
     approach: Approach,
 ) -> Iterator[Choice]:
-    """Yield what follows a grasp, by each way; nothing if its direction is wrong."""
+    """Yield a grasp, until the object is raised; nothing if its direction is wrong."""
     at = cell.pose(name) * grasp
     along = float(at.rotation[:, 2] @ approach.direction)
     if along < math.cos(approach.upright):
@@ -199,24 +218,44 @@ def _choices(
         if 0.0 < ahead < MOST_LIFT - back - ROOM:
             held, before, first = reach(back + ahead + ROOM)
             met = _overlap_while_closing(cell, name, arm, site.grasp, first)
-    grasp, angle = held, math.acos(min(1.0, along))
-    for way, extra in ways:
-        poses = [pose * grasp for pose in way]
-        if approach.leave > 0.0:
-            poses.append(poses[-1] * pin.SE3(np.eye(3), approach.leave * DOWN))
-        outlook = arm.look_ahead(poses, site.grasp, after=first)
-        carried = map(arm.configuration, outlook.q[len(first.q) :])
-        depth = max(met, *(cell.overlap(arm, q, but=name) for q in carried), 0.0)
-        yield Choice(
-            arm=arm,
-            site=site,
-            before=before,
-            away=approach.away,
-            grasp=grasp,
-            then=way,
-            outlook=outlook,
-            cost=outlook.cost + ANGLE * angle + extra + OVERLAP * depth,
-        )
+    angle = ANGLE * math.acos(min(1.0, along))
+    yield Choice(
+        arm=arm,
+        site=site,
+        before=before,
+        away=approach.away,
+        grasp=held,
+        then=(),
+        outlook=first,
+        depth=max(met, 0.0),
+        cost=first.cost + angle + OVERLAP * max(met, 0.0),
+    )
+
+
+def _follow(
+    cell: Workcell,
+    name: str,
+    begun: Choice,
+    way: tuple[pin.SE3, ...],
+    extra: float,
+    most: float,
+    leave: float,
+) -> Choice | None:
+    """Return a grasp with what follows it; None if it costs more than `most`."""
+    arm, first = begun.arm, begun.outlook
+    spent = begun.cost - first.cost + extra
+    if first.cost + spent > most:
+        return None
+    poses = [begun.hand_at(pose) for pose in way]
+    if leave > 0.0:
+        poses.append(poses[-1] * pin.SE3(np.eye(3), leave * DOWN))
+    outlook = arm.look_ahead(poses, begun.site.grasp, after=first, most=most - spent)
+    if outlook.cost + spent > most:
+        return None
+    carried = map(arm.configuration, outlook.q[len(first.q) :])
+    depth = max(begun.depth, *(cell.overlap(arm, q, but=name) for q in carried), 0.0)
+    cost = outlook.cost + spent + OVERLAP * (depth - begun.depth)
+    return replace(begun, then=way, outlook=outlook, depth=depth, cost=cost)
 
 
 def _needed_lift(cell: Workcell, name: str, arm: Arm, grasp: str, at: pin.SE3) -> float:

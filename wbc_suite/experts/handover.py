@@ -118,14 +118,14 @@ def _cost_of_taking(
     cell: Workcell, name: str, taker: Arm, place: str, pose: pin.SE3, direction: Vector
 ) -> float:
     """Return the cost of the easiest grasp of the taker at a pose of the object."""
-    costs = [math.inf]
+    least = math.inf
     for site in cell.grasps(name):
         at = pose * site.pose
         if site.name != place or at.rotation[:, 2] @ direction < math.cos(FACING):
             continue
         before = shifted(at, -0.1 * at.rotation[:, 2])
-        costs.append(taker.look_ahead([before, at]).cost)
-    return min(costs)
+        least = min(least, taker.look_ahead([before, at], most=least).cost)
+    return least
 
 
 def _along(axis: Vector, roll: float) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -17,6 +17,7 @@ STEP = 0.1  # s, time of one iteration
 ITERATIONS = 60  # for each pose at most
 STUCK = 2e-3  # rad or m, of joints in an iteration
 CLOSE = 1e-3  # m and rad
+SPAN = 3  # iterations, over which progress is measured
 SWEEP = 0.4  # of the greatest velocity of joints, on a sweep
 SINGULAR = 0.05  # dexterity below which controllers lag
 
@@ -116,11 +117,17 @@ class LookAhead:
             yield configuration.frame_pose(self._frames[0])
 
     def along(
-        self, poses: Iterable[Sequence[pin.SE3]], after: Outlook | None = None
+        self,
+        poses: Iterable[Sequence[pin.SE3]],
+        after: Outlook | None = None,
+        *,
+        most: float = math.inf,
     ) -> Outlook:
         """Follow a chain of poses in the world, each one pose for each frame.
 
-        It begins where the hands are, or goes on `after` another outlook.
+        It begins where the hands are, or goes on `after` another outlook. It ends on
+        the way once its cost is above `most`, as costs only grow; the error is
+        what would be left if hands came nearer as fast as now.
         """
         configuration = self._configuration
         if after is None:
@@ -135,37 +142,22 @@ class LookAhead:
         else:
             begun = after.q
         configuration.update(after.q[-1])
-        error, margin, times = after.error, after.margin, after.times
-        dexterity = after.dexterity
-        found = [*begun]
+        met, found = replace(after, q=()), [*begun]
         for targets in poses:
             for task, target in zip(self._tasks, targets, strict=True):
                 task.set_target(target)
-            left, moved, least = self._descend()
-            times = times + moved / self._speed
-            error, dexterity = max(error, left), min(dexterity, least)
-            q = configuration.q.copy()
-            found.append(q)
-            limited = q[self._limited]
-            gaps = np.minimum(limited - self._low, self._high - limited)
-            margin = min(margin, float(gaps.min(initial=np.inf)))
-        return Outlook(
-            error=error,
-            margin=margin,
-            dexterity=dexterity,
-            times=times,
-            q=tuple(found),
-        )
+            met = self._descend(met, most)
+            found.append(configuration.q.copy())
+            if met.cost > most:
+                break
+        return replace(met, q=tuple(found))
 
-    def _descend(self) -> tuple[float, Vector, float]:
-        """Move to the targets of the tasks.
-
-        Returns the error, how far joints went, and the least dexterity met.
-        """
-        configuration = self._configuration
-        travel, least = np.zeros(configuration.nv), np.inf
+    def _descend(self, before: Outlook, most: float) -> Outlook:
+        """Move to the targets of the tasks; return what was met up to there."""
+        configuration, left, earlier = self._configuration, np.inf, np.inf
+        travel, least = np.zeros(configuration.nv), before.dexterity
         self._stack.reset()
-        for _ in range(ITERATIONS):
+        for k in range(1, ITERATIONS + 1):
             step = self._stack.solve(STEP).dq
             configuration.update(configuration.integrate(step))
             travel += np.abs(step)
@@ -174,12 +166,31 @@ class LookAhead:
             left = self._error()
             if left < CLOSE or np.abs(step).max() < STUCK:
                 break
-        return self._error(), travel, least
+            if most < np.inf and k % SPAN == 0:
+                to_come = (ITERATIONS - k) * (earlier - left) / SPAN
+                hopeful = self._met(before, travel, least, max(left - to_come, 0.0))
+                if hopeful.cost > most:
+                    break
+                earlier = left
+        met = self._met(before, travel, least, left)
+        q = configuration.q[self._limited]
+        gaps = np.minimum(q - self._low, self._high - q)
+        return replace(met, margin=min(before.margin, float(gaps.min(initial=np.inf))))
+
+    def _met(
+        self, before: Outlook, travel: Vector, least: float, error: float
+    ) -> Outlook:
+        """Return an outlook with how far joints went since, and what they met."""
+        return replace(
+            before,
+            error=max(before.error, error),
+            dexterity=least,
+            times=before.times + travel / self._speed,
+        )
 
     def _error(self) -> float:
-        errors = [task.error(self._configuration) for task in self._tasks]
-        norm = np.linalg.norm
-        return max(float(norm(e[:3]) + 0.1 * norm(e[3:])) for e in errors)
+        errors = [task.error(self._configuration).tolist() for task in self._tasks]
+        return max(math.hypot(*e[:3]) + 0.1 * math.hypot(*e[3:]) for e in errors)
 
 
 def _dexterity(J: Matrix) -> float:

@@ -36,11 +36,12 @@ def _place(cell: Workcell[PickPlace], name: str) -> Steps[None]:
     height = lying.translation[2] - config.source.center[2]
     middle = np.array([x, y, config.target.center[2] + height + 0.004])
     over = config.target.size[2] + CLEAR
+    hands = [arm.home.translation - middle for arm in cell.arms]
+    dx, dy, _ = ASIDE * np.sign(min(hands, key=np.linalg.norm))  # towards the nearest
     ways = [
-        pin.SE3(R @ lying.rotation, middle + np.array([dx, dy, 0.0]))
+        pin.SE3(R @ lying.rotation, middle + np.array([*aside, 0.0]))
+        for aside in ((dx, dy), (0.0, 0.0), (dx, 0.0), (0.0, dy))
         for R in TURNS
-        for dx in (0.0, -ASIDE, ASIDE)
-        for dy in (0.0, -ASIDE, ASIDE)
     ]
     plans = [(shifted(way, over * UP), way) for way in ways]
     choice = yield from pick(

@@ -67,6 +67,7 @@ class Recorder:
             "began": datetime.now(UTC).isoformat(timespec="milliseconds"),
             "rng_state": json.dumps(state),
             "model_file": self._model_file,
+            "instruction": self._inner.instruction,
             **self.notes,
         }
         if seed is not None and seed >= 0:

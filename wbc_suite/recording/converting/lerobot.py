@@ -62,7 +62,7 @@ def _write(
 ) -> dict[str, Any]:
     """Write frames and videos of a piece; return its rows of the table of episodes."""
     arrow, parquet = _import_pyarrow()
-    rate, place = _rate(dataset), _place(piece.number)
+    rate, place, tasks = _rate(dataset), _place(piece.number), _tasks(dataset)
     first = dataset.episode(piece.names[0])
     writers = {
         key: _open_video(out / f"videos/{_feature(key)}/{place}.mp4", rate)
@@ -73,14 +73,17 @@ def _write(
         for number, name in enumerate(piece.names, start=piece.before):
             episode = dataset.episode(name)
             columns = _vectors(episode)
-            tables.append(_frames(arrow, columns, number, start, rate))
+            task = _task(dataset, name)
+            row_of_task = tasks.index(task)
+            tables.append(_frames(arrow, columns, number, start, rate, row_of_task))
             stats = {name: _stats(column) for name, column in columns.items()}
             for key, writer in writers.items():
                 pictures = episode.columns[f"obs/{key}"]
                 for picture in pictures:
                     writer.add(picture)
                 stats[_feature(key)] = _picture_stats(pictures)
-            row = _episode_row(dataset, piece, number, episode.length, start, writers)
+            row = _episode_row(rate, piece, number, episode.length, start, writers)
+            row["tasks"] = [task]
             for feature, figures in stats.items():
                 row |= {f"stats/{feature}/{name}": v for name, v in figures.items()}
             rows.append(row)
@@ -104,7 +107,8 @@ def _finish(dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Any]]) ->
     table = arrow.concat_tables([parquet.ParquetFile(path).read() for path in frames])
     episodes = arrow.Table.from_pylist(rows)
     _write_table(parquet, episodes, out / f"meta/episodes/{_place(0)}.parquet")
-    tasks = arrow.table({"task_index": arrow.array([0]), "task": [_task(dataset)]})
+    known = _tasks(dataset)
+    tasks = arrow.table({"task_index": [*range(len(known))], "task": known})
     keys = "name", "field_name", "pandas_type", "numpy_type", "metadata"
     columns = [
         ("task_index", "task_index", "int64", "int64", None),
@@ -131,8 +135,15 @@ def _rate(dataset: Dataset) -> float:
     return int(rate) if rate.is_integer() else rate
 
 
-def _task(dataset: Dataset) -> str:
-    return str(dataset.header.get("env", "demonstration"))
+def _task(dataset: Dataset, name: str) -> str:
+    """Return the instruction of an episode; the environment's name if it has none."""
+    other = dataset.header.get("env", "demonstration")
+    return str(dataset.facts(name).get("instruction", other))
+
+
+def _tasks(dataset: Dataset) -> list[str]:
+    """Return the instructions of all episodes, each once, in order of their numbers."""
+    return sorted({_task(dataset, name) for name in dataset.names})
 
 
 def _pictures(episode: Episode) -> list[str]:
@@ -163,7 +174,12 @@ def _vectors(episode: Episode) -> dict[str, NDArray[np.float32]]:
 
 
 def _frames(
-    arrow: Any, columns: Mapping[str, Any], number: int, start: int, rate: float
+    arrow: Any,
+    columns: Mapping[str, Any],
+    number: int,
+    start: int,
+    rate: float,
+    task: int,
 ) -> Any:
     table = {
         name: arrow.FixedSizeListArray.from_arrays(column.ravel(), column.shape[1])
@@ -174,7 +190,7 @@ def _frames(
     table["frame_index"] = frames
     table["episode_index"] = np.full_like(frames, number)
     table["index"] = frames + start
-    table["task_index"] = np.zeros_like(frames)
+    table["task_index"] = np.full_like(frames, task)
     return arrow.table(table)
 
 
@@ -196,18 +212,16 @@ def _picture_stats(pictures: NDArray[np.uint8]) -> Stats:
 
 
 def _episode_row(
-    dataset: Dataset,
+    rate: float,
     piece: Piece,
     number: int,
     length: int,
     start: int,
     videos: Iterable[str],
 ) -> dict[str, Any]:
-    rate = _rate(dataset)
     place = {"chunk_index": piece.number // CHUNK, "file_index": piece.number % CHUNK}
     row: dict[str, Any] = {
         "episode_index": number,
-        "tasks": [_task(dataset)],
         "length": length,
         "dataset_from_index": start,
         "dataset_to_index": start + length,
@@ -252,7 +266,7 @@ def _info(dataset: Dataset, first: Episode, frames: int) -> dict[str, Any]:
         "robot_type": " ".join(robots) if isinstance(robots, list) else str(robots),
         "total_episodes": len(dataset),
         "total_frames": frames,
-        "total_tasks": 1,
+        "total_tasks": len(_tasks(dataset)),
         "chunks_size": CHUNK,
         "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 200,
