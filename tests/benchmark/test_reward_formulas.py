@@ -31,6 +31,13 @@ def near(scale, distance):
     return 1.0 - math.tanh(scale * distance)
 
 
+@pytest.mark.parametrize("known", [None, True, False])
+def test_a_success_that_is_known_is_not_asked_for_again(known):
+    task = stub(success=lambda: True, progress=lambda: 0.25)
+    reward = ObjectBenchmark.reward(task, shaped=True, success=known)
+    assert reward == (0.25 if known is False else 1.0)
+
+
 @pytest.mark.parametrize("distances", [[0.0], [0.1, 0.0], [0.3, 0.05]])
 def test_reach_is_the_mean_over_hands(distances):
     config = load_benchmark("Reach").config
@@ -70,7 +77,7 @@ def test_carry_counts_hands_the_way_and_the_place(share, carried, put_down):
     config = load_benchmark("Carry").config
     numbers = config.reward
     start, goal = np.array(config.table.center), np.array(config.other)
-    at = start + share * (goal - start)
+    at = start + share * (goal - start) + [0.0, 0.0, 0.3]  # as high as it is carried
     distances = {0: [0.1, 0.4], 1: [0.5, 0.02]}
     places = iter([0, 1, 0, 1])
     task = stub(

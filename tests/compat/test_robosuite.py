@@ -92,6 +92,33 @@ def test_states_go_out_and_in_as_in_datasets(env):
         env.reset_from_xml_string("<mujoco/>")
 
 
+def test_datasets_of_time_qpos_and_qvel_play_back():
+    """robosuite's and robomimic's scripts compare such states, of one shape."""
+    quiet = {"has_offscreen_renderer": False, "use_camera_obs": False}
+    env = robosuite.make("Lift", robots="Panda", **quiet)
+    env.reset()
+    text, size = env.sim.model.get_xml(), 1 + env.sim.model.nq + env.sim.model.nv
+    actions = np.random.default_rng(0).uniform(-0.3, 0.3, (4, env.action_dim))
+    whole = [env.sim.get_state().flatten()]
+    for action in actions:
+        env.step(action)
+        whole.append(env.sim.get_state().flatten())
+    states = np.array(whole)[:, :size]
+    env.reset()
+    env.reset_from_xml_string(text)
+    env.sim.reset()
+    env.sim.set_state_from_flattened(states[0])
+    env.sim.forward()
+    for action, state in zip(actions, states[1:], strict=True):
+        env.step(action)
+        found = env.sim.get_state().flatten()
+        assert found.shape == state.shape
+        np.testing.assert_allclose(found, state, atol=1e-6)
+    env.reset()
+    assert env.sim.get_state().flatten().shape == whole[0].shape
+    env.close()
+
+
 @pytest.mark.parametrize(("robot", "size"), [("Panda", 7), ("Tiago", 20)])
 def test_basic_without_a_robot_fits_any(robot, size):
     config = robosuite.load_composite_controller_config(controller="BASIC")

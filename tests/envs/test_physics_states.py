@@ -267,6 +267,29 @@ def test_states_of_a_start_do_not_depend_on_what_was_before(lifts):
     np.testing.assert_array_equal(used.physics_state, new.physics_state)
 
 
+@pytest.mark.parametrize("part", ["OSC_POSE", "JOINT_POSITION"])
+def test_gains_outlive_a_reset_unless_actions_set_them(part):
+    def made(mode):
+        right = {"type": part, "impedance_mode": mode, "kp": 100.0}
+        config = {"type": "BASIC", "body_parts": {"right": right}}
+        env = wbc_suite.make("Lift", robots="Panda", controller_configs=config)
+        env.reset(seed=0)
+        return env, env.controllers[0].parts["right"].law
+
+    env, law = made("fixed")
+    law.gains[0][:] = 250.0
+    env.reset(seed=1)
+    env.reset_to(made("fixed")[0].physics_state)
+    assert np.all(law.gains[0] == 250.0)
+
+    pair = [made("variable")[0] for _ in range(2)]
+    check_goes_on(*pair)
+    law = pair[0].controllers[0].parts["right"].law
+    assert np.any(law.gains[0] != 100.0)
+    pair[0].reset(seed=1)
+    assert np.all(law.gains[0] == 100.0)
+
+
 def test_generators_are_words_and_back():
     rng = np.random.default_rng(5)
     rng.integers(10, dtype=np.int32)  # half of a word waits

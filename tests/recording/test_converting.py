@@ -8,6 +8,7 @@ import signal
 from dataclasses import replace
 from pathlib import Path
 from shutil import rmtree
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -19,8 +20,9 @@ from wbc_suite.envs.states import motion_size
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.executors import Processes, Serial
 from wbc_suite.recording import Dataset, Store, editing, rebuild
-from wbc_suite.recording.converting import convert
+from wbc_suite.recording.converting import convert, lerobot
 from wbc_suite.recording.converting.conversion import convert_piece
+from wbc_suite.recording.converting.layout import Piece
 from wbc_suite.recording.extracting import extract
 from wbc_suite.recording.replaying import divergence, play_states
 from wbc_suite.wrappers import DataCollection
@@ -120,6 +122,17 @@ def test_tasks_of_lerobots_layout_are_the_instructions_of_episodes(tmp_path):
     ).tolist()
     info = json.loads((out / "meta/info.json").read_text())
     assert info["total_tasks"] == len(tasks["task"])
+
+
+def test_an_episode_in_lerobots_layout_is_a_span_of_its_film():
+    """Without pyarrow, which the tests of files need."""
+    header = SimpleNamespace(header={"control_freq": 10.0, "env": "Lift"})
+    piece = Piece(number=1002, names=("demo_7",), start=400, before=7)
+    row = lerobot._episode_row(header, piece, 7, 30, 450, ["top_image"])
+    film = "videos/observation.images.top"
+    assert (row[f"{film}/from_timestamp"], row[f"{film}/to_timestamp"]) == (5.0, 8.0)
+    assert (row["dataset_from_index"], row["dataset_to_index"]) == (450, 480)
+    assert (row["data/chunk_index"], row["data/file_index"]) == (1, 2)
 
 
 def test_lerobots_videos_have_a_frame_for_each_action(tmp_path):

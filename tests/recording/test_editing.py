@@ -74,3 +74,15 @@ def test_split_and_filter_keep_the_numbers(small_recording, tmp_path, same_numbe
         editing.filter_dataset(small_recording, out, lambda *_: False)
     with pytest.raises(DatasetError, match="may be empty"):
         editing.split(small_recording, valid=0.01)
+
+
+def test_each_file_that_cannot_be_opened_is_named(tmp_path, monkeypatch):
+    bad = {tmp_path / "b.hdf5", tmp_path / "e.hdf5"}
+
+    def check(files):
+        for file in bad.intersection(files):
+            raise DatasetError(f"{file.name} hangs")
+
+    monkeypatch.setattr(editing, "check_files", check)
+    found = editing._damage([tmp_path / f"{name}.hdf5" for name in "abcdef"])
+    assert found == {file: f"{file.name} hangs" for file in bad}

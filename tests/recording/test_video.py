@@ -141,9 +141,10 @@ def test_a_sheet_shows_recorded_pictures_from_first_to_last(with_pictures, tmp_p
 def test_a_chart_has_a_bar_for_each_episode_in_the_colour_of_its_result(
     small_recording, tmp_path
 ):
-    path = tmp_path / "new" / "chart.png"
+    path = tmp_path / "new" / "folder" / "chart.png"
     with Dataset(small_recording) as dataset:
-        write_plots(dataset, path)
+        for _ in range(2):  # the folder is new, then it is there
+            write_plots(dataset, path)
     with Image.open(path) as chart:
         assert chart.size == (WIDTH, 3 * HEIGHT)
         row = [chart.getpixel((x, HEIGHT - 20)) for x in range(WIDTH)]

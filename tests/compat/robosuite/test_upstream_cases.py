@@ -197,6 +197,7 @@ def test_wrappers(suite, tmp_path):
     [file] = folder.glob("state_*.npz")
     data = np.load(file, allow_pickle=True)
     size = 1 + env.sim.model.nq + env.sim.model.nv
+    # robosuite's from_flattened takes time, qpos and qvel, and ignores what follows
     assert data["states"].shape == (3, len(env.sim.get_state().flatten()))
     np.testing.assert_array_equal(
         np.diff(data["states"][:, :size], axis=0)[:, 0] > 0.0, True

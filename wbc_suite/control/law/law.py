@@ -23,8 +23,8 @@ FOREVER = np.inf
 """s; a reference that moves until it is replaced."""
 
 _TIMES = ("since", "duration")
-_HAND = ("reference", "start", "shift", "turn", "kp", "kd")
-_REFERENCES = ("position", "velocity", "acceleration", "jerk", "kp", "kd")
+_HAND = ("reference", "start", "shift", "turn")
+_REFERENCES = ("position", "velocity", "acceleration", "jerk")
 _OBSERVER = ("desired", "last_velocity", "saturation", "disturbance")
 """Fields of records that a goal or a step changes."""
 
@@ -102,7 +102,10 @@ class Law:
 
     @property
     def memory(self) -> Parts:
-        """Fields of its records that outlive a step; views."""
+        """Fields of its records that outlive a step; views.
+
+        Gains are settings: a controller whose actions set them adds `gains` to its own.
+        """
         record, kind = self.record, int(self.record["kind"][0])
         fields = _TIMES
         if kind == LawKind.OSC or kind >= LawKind.CUSTOM:
@@ -111,6 +114,11 @@ class Law:
             fields = *fields, "parameters"
         drives = [self.drives[name] for name in (*_REFERENCES, *_OBSERVER)]
         return *(record[name] for name in fields), *drives
+
+    @property
+    def gains(self) -> Parts:
+        """Stiffness and damping; views of its records."""
+        return self.drives["kp"], self.drives["kd"]
 
     def reset(self, state: RobotState) -> None:
         """Reset the disturbance observer."""

@@ -18,6 +18,7 @@ from wbc_suite.control.loop.rigid_body import (
     rotation,
     write_inertia,
 )
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.state import RobotState
 from wbc_suite.linear_algebra import (
     cholesky,
@@ -66,6 +67,11 @@ class OscLaw(Law):
         super().__init__(LawKind.OSC, state, joints)
         self.record["site"] = state.model.site(state.prefix + site).id
         self.record["speed"] = np.inf
+
+    @property
+    def gains(self) -> Parts:
+        """Stiffness and damping of the site; views of its record."""
+        return self.record["kp"], self.record["kd"]
 
     def set_goal(
         self,

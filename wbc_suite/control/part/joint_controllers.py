@@ -123,8 +123,9 @@ class JointPositionController(PartController[JointLaw]):
 
     @property
     def memory(self) -> Parts:
-        """Goal and gains; views."""
-        return self.goal, *self._impedance.memory
+        """Goal, and gains that actions set; views."""
+        gains = self.law.gains if self._impedance.slices else ()
+        return self.goal, *self._impedance.memory, *gains
 
     def reset(self, state: RobotState) -> None:
         """Hold the joints where they are."""

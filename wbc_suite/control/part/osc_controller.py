@@ -160,8 +160,9 @@ class OscController(PartController[OscLaw]):
 
     @property
     def memory(self) -> Parts:
-        """Goal, the pose from which turns are limited, and gains."""
-        return *self._goal.memory, *self._impedance.memory
+        """Goal, the pose from which turns are limited, and gains that actions set."""
+        gains = self.law.gains if self._impedance.slices else ()
+        return *self._goal.memory, *self._impedance.memory, *gains
 
     @property
     def goal(self) -> pin.SE3:

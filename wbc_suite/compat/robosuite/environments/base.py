@@ -182,6 +182,7 @@ class MujocoEnv(Observing):
 
     def _begin(self) -> Observation:
         self.timestep, self.done, self.fresh = 0, False, False
+        self.sim.whole_states = True
         self._reset_observables()
         return self._get_observations(force_update=True)
 

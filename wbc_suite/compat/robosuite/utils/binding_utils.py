@@ -234,7 +234,14 @@ class MjSim:
 
     `cameras` renders, if there is one. Of an environment, `start` runs after time, qpos
     and qvel were written, `read` returns a whole state and `restore` writes it.
+
+    Attributes:
+        whole_states: Whether states hold the rest of the world beside time, qpos and
+            qvel; not in an episode that was set to a state without it, for scripts
+            compare states of robosuite's datasets with those that they play back.
     """
+
+    whole_states = True
 
     def __init__(
         self,
@@ -291,7 +298,7 @@ class MjSim:
     def get_state(self) -> MjSimState:
         """Return the physics state, copied."""
         data = self.data._data
-        if self._read is not None:
+        if self._read is not None and self.whole_states:
             return MjSimState.from_flattened(self._read(), self)
         return MjSimState(float(data.time), data.qpos.copy(), data.qvel.copy())
 
@@ -306,7 +313,8 @@ class MjSim:
         start from there.
         """
         model = self.model._model
-        if self._restore is not None and np.size(value) > motion_size(model):
+        self.whole_states = np.size(value) > motion_size(model)
+        if self._restore is not None and self.whole_states:
             self._restore(value)
             return
         write_physics(model, self.data._data, value)
