@@ -263,7 +263,7 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
         qp.lower[nv + p + row] = b[row]
 
 
-@inner
+@compiled
 def stiffness(tasks: TaskArrays) -> float:
     """Return the largest entry of H without damping, or 1."""
     stiffest, W = 1.0, tasks.W
