@@ -361,3 +361,26 @@ def test_processes_that_start_at_once_compile_each_kernel_once(tmp_path):
         process.stdin.flush()
     misses = [int(process.communicate()[0]) for process in started]
     assert sum(misses) == 6
+
+
+@pytest.mark.slow
+def test_copies_of_the_package_share_their_machine_code(tmp_path):
+    """Such as a checkout and an installed package, in whatever folder they are."""
+    source, cache = Path(kernel_cache.__file__).parent, tmp_path / "cache"
+    use = """
+import numpy as np
+from wbc_suite.linear_algebra import cholesky
+cholesky(np.eye(2), 2, 0.0)
+print(sum(cholesky.stats.cache_hits.values()))
+"""
+    for place, hits in (("one", 0), ("other", 1)):
+        shutil.copytree(source, tmp_path / place / source.name)
+        environment = {"PYTHONPATH": str(tmp_path / place), "PATH": os.environ["PATH"]}
+        found = subprocess.run(
+            [sys.executable, "-c", use],
+            env=environment | {"NUMBA_CACHE_DIR": str(cache)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert int(found.stdout) == hits

@@ -6,10 +6,8 @@ Machine code is kept on disk, in one folder for each state of the package's kern
 import ctypes
 import inspect
 import logging
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 from types import FunctionType
@@ -18,10 +16,11 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 from numba import types
+from numba.core import event
 from numba.experimental import structref
 from numba.extending import register_jitable
 
-from wbc_suite.kernel_cache import cache_folder
+from wbc_suite.kernel_cache import PACKAGE, cache_folder
 from wbc_suite.typing import Records
 
 log = logging.getLogger(__name__)
@@ -33,11 +32,12 @@ _structref: Any = structref
 Function = TypeVar("Function", bound=Callable[..., Any])
 Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
-PATIENCE = 1.5  # s; what compiles for longer is announced; reading the code takes 0.2
+PATIENCE = 1.5  # s; what compiles for longer is announced
 INTERVAL = 5.0  # s between two messages about the progress of compiling
+PROGRESS = "Compiling kernels, once on this machine: %d so far, in %.0f s"
 
 _KERNELS: list[Any] = []
-"""All kernels of imported modules, to report how many are compiled."""
+"""All kernels of imported modules."""
 
 
 def compiled(function: Function, *, kept: bool = True, **options: Any) -> Function:
@@ -51,7 +51,9 @@ def compiled(function: Function, *, kept: bool = True, **options: Any) -> Functi
         kept: Whether the machine code is kept on disk; not where an argument is a
             kernel that is made at run time, whose type no other process knows.
         options: Of numba: `nogil` releases the interpreter's lock, for long calls only
-            (a thread needs up to 50 us to get it back).
+            (a thread needs up to 50 us to get it back); `inline` writes a kernel into
+            its callers: for large ones with one caller, since numba's search for calls
+            begins again after each.
     """
     kernel = _in_cache(partial(_njit, cache=kept, **_OPTIONS, **options), function)
     if not _numba.DISABLE_JIT:
@@ -60,6 +62,7 @@ def compiled(function: Function, *, kept: bool = True, **options: Any) -> Functi
 
 
 compiled_nogil = partial(compiled, nogil=True)
+compiled_inline = partial(compiled, inline="always")
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
 
@@ -136,12 +139,14 @@ _RESULTS: dict[str, Any] = {
 
 def _in_cache(make: Any, function: Any) -> Any:
     """Let numba make a kernel whose machine code is kept in the package's folder."""
-    previous = _numba.CACHE_DIR
+    previous = _numba.CACHE_DIR, _numba.CACHE_LOCATOR_CLASSES
     _numba.CACHE_DIR = str(cache_folder())
+    if Path(function.__code__.co_filename).is_relative_to(PACKAGE):
+        _numba.CACHE_LOCATOR_CLASSES = "wbc_suite.kernel_cache.PackageLocator"
     try:
         return make(function)
     finally:
-        _numba.CACHE_DIR = previous
+        _numba.CACHE_DIR, _numba.CACHE_LOCATOR_CLASSES = previous
 
 
 def is_compiling() -> bool:
@@ -217,30 +222,31 @@ class _StructType(types.StructRef):
         return tuple((name, types.unliteral(kind)) for name, kind in fields)
 
 
-@contextmanager
-def announced(what: str) -> Iterator[None]:
-    """Log what is being compiled, and how far it is, when that takes long.
+class _Progress(event.Listener):
+    """Log how many kernels were compiled in which time, while that goes on.
 
-    The processor's time counts: a busy machine does not cause a message.
+    Machine code from the disk raises no event.
     """
-    start, done = time.process_time(), threading.Event()
 
-    def watch() -> None:
-        said = PATIENCE
-        while not done.wait(0.2):
-            spent = time.process_time() - start
-            if spent > said:
-                said = spent + INTERVAL
-                count = sum(bool(kernel.signatures) for kernel in list(_KERNELS))
-                log.warning(
-                    "Compiling %s, once on this machine, about half a minute: "
-                    "%d of %d functions after %.0f s",
-                    *(what, count, len(_KERNELS), spent),
-                )
+    count = depth = 0
+    start = spent = said = 0.0  # s of wall time
 
-    thread = threading.Thread(target=watch, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        done.set()
+    def on_start(self, event: Any) -> None:
+        """Note when the first of nested kernels begins."""
+        if self.depth == 0:
+            self.start = time.monotonic()
+        self.depth += 1
+
+    def on_end(self, event: Any) -> None:
+        """Count a kernel, and say so from time to time."""
+        self.depth -= 1
+        self.count += 1
+        spent = self.spent + time.monotonic() - self.start
+        if spent > max(PATIENCE, self.said + INTERVAL):
+            self.said = spent
+            log.warning(PROGRESS, self.count, spent)
+        if self.depth == 0:
+            self.spent = spent
+
+
+event.register("numba:compile", _Progress())

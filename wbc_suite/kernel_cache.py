@@ -26,11 +26,14 @@ from typing import IO, Any
 
 import numba
 from numba.core import event
+from numba.core.caching import UserProvidedCacheLocator
 
 from wbc_suite.catalogue import temporary_root, user_cache
 
 _untyped: Any = numba
 _event: Any = event
+
+PACKAGE = Path(__file__).parent
 
 KEPT = 7 * 24 * 3600.0  # s; code that no process asks for in this time is deleted
 TORN = 3600.0  # s; a file that is still being written after this was abandoned
@@ -40,6 +43,25 @@ LONGEST = 120.0  # s that a process waits for another one, which may be stopped
 CHECKED = "checked.json"
 """Size, time of change and CRC-32 of each file, by name, when it was checked."""
 KERNELS = b"wbc_suite.compiling" + b" import"  # in two, for this file has no kernels
+
+
+class PackageLocator(UserProvidedCacheLocator):
+    """Tell numba where it finds a kernel of this package, whichever copy runs.
+
+    Numba names a folder after the path of the source, and compares its time. This one
+    is named after the module, and its parent after the state of all kernels: copies of
+    the package, such as on a cluster or in an image, read the same files. Numba's
+    `CACHE_LOCATOR_CLASSES` names this class while a kernel is made.
+    """
+
+    def __init__(self, py_func: Any, py_file: str) -> None:
+        super().__init__(py_func, py_file)
+        module = Path(py_file).relative_to(PACKAGE).with_suffix("")
+        self._cache_path = str(cache_folder() / ".".join(module.parts))
+
+    def get_source_stamp(self) -> str:
+        """Return nothing: the folder changes with the source."""
+        return ""
 
 
 @cache

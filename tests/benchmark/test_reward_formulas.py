@@ -12,6 +12,7 @@ from wbc_suite.benchmark import load_benchmark
 from wbc_suite.benchmark.arrangement import with_default
 from wbc_suite.benchmark.carry import Carry
 from wbc_suite.benchmark.falls import fall_of
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark
 from wbc_suite.benchmark.predicates import Predicates
 from wbc_suite.benchmark.reach import Reach
 from wbc_suite.benchmark.standing import arrange_on_feet

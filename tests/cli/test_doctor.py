@@ -1,9 +1,11 @@
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 
 from wbc_suite.cli import doctor
 from wbc_suite.cli.doctor import diagnose
+from wbc_suite.errors import ConfigError
 from wbc_suite.sensing import gl_backend
 
 
@@ -63,3 +65,18 @@ def test_an_absent_solver_is_named(monkeypatch, absent):
     expected = "broken" if absent == "osqp" else "optional"
     assert absent in finding.text
     assert finding.state == expected
+
+
+@pytest.mark.slow
+def test_kernels_of_robots_are_compiled(capsys):
+    doctor.doctor(["Panda"], compiles=True)
+    robot, folder = capsys.readouterr().out.splitlines()
+    assert robot.startswith("Panda: ready after ")
+    assert any(Path(folder.removeprefix("Kernels are in ")).rglob("*.nbi"))
+
+
+@pytest.mark.parametrize("arguments", [(["Panda"], False), ([], True)])
+def test_robots_and_compile_belong_together(arguments):
+    robots, compiles = arguments
+    with pytest.raises(ConfigError, match="--compile Panda"):
+        doctor.doctor(robots, compiles=compiles)

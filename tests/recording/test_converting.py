@@ -8,7 +8,6 @@ import signal
 from dataclasses import replace
 from pathlib import Path
 from shutil import rmtree
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -126,9 +125,8 @@ def test_tasks_of_lerobots_layout_are_the_instructions_of_episodes(tmp_path):
 
 def test_an_episode_in_lerobots_layout_is_a_span_of_its_film():
     """Without pyarrow, which the tests of files need."""
-    header = SimpleNamespace(header={"control_freq": 10.0, "env": "Lift"})
     piece = Piece(number=1002, names=("demo_7",), start=400, before=7)
-    row = lerobot._episode_row(header, piece, 7, 30, 450, ["top_image"])
+    row = lerobot._episode_row(10.0, piece, 7, 30, 450, ["top_image"])
     film = "videos/observation.images.top"
     assert (row[f"{film}/from_timestamp"], row[f"{film}/to_timestamp"]) == (5.0, 8.0)
     assert (row["dataset_from_index"], row["dataset_to_index"]) == (450, 480)

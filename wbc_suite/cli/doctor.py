@@ -4,17 +4,18 @@ import importlib
 import json
 import platform
 import sys
+import time
 import timeit
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import KW_ONLY, asdict, dataclass
 from importlib import metadata
-from typing import Literal
+from typing import Annotated, Literal
 
 import typer
 
-from wbc_suite.cli.options import JsonOption
+from wbc_suite.cli.options import ControllerOption, JsonOption
 from wbc_suite.cli.output import print
-from wbc_suite.errors import WbcError
+from wbc_suite.errors import ConfigError, WbcError
 
 BASE_SOLVERS = ("daqp", "proxqp", "osqp")  # of the package; names of `qpsolvers`
 EXTRA_SOLVERS = ("piqp", "clarabel", "quadprog")  # of the extra `solvers`
@@ -24,11 +25,33 @@ REPAIR_MUJOCO = "pip install --force-reinstall --no-deps " + " ".join(MUJOCO_PAR
 _MARKS = {"fine": "ok  ", "optional": "note", "broken": "BAD "}
 
 
-def doctor(as_json: JsonOption = False) -> None:
+RobotsArgument = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[ROBOT]...", help="Robots for --compile."),
+]
+CompileOption = Annotated[
+    bool,
+    typer.Option(
+        "--compile",
+        help="Compile the kernels of these robots with their own controllers, and keep "
+        "them, such as in an image or on a cluster; see NUMBA_CACHE_DIR.",
+    ),
+]
+
+
+def doctor(
+    robots: RobotsArgument = None,
+    compiles: CompileOption = False,
+    controller: ControllerOption = None,
+    as_json: JsonOption = False,
+) -> None:
     """Check this machine: packages, solvers, rendering, and what is missing.
 
     The exit code is 1 if a required component is broken.
     """
+    if robots or compiles:
+        compile_kernels(robots or [], controller, compiles=compiles)
+        return
     broken = 0
     if as_json:
         findings = [asdict(finding) for finding in diagnose()]
@@ -43,6 +66,27 @@ def doctor(as_json: JsonOption = False) -> None:
         print("A required component is broken: see BAD above.")
         raise typer.Exit(1)
     print("All required components work.")
+
+
+def compile_kernels(
+    robots: Sequence[str], controller: str | None, *, compiles: bool
+) -> None:
+    """Make one step of each robot, so that its machine code is in the cache."""
+    import numpy as np
+
+    from wbc_suite.envs import make
+    from wbc_suite.kernel_cache import cache_folder
+
+    if not robots or not compiles:
+        raise ConfigError("doctor: give --compile and robots, such as --compile Panda.")
+    for robot in robots:
+        start = time.monotonic()
+        env = make("Lift", robots=robot, controller_configs=controller)
+        env.reset(seed=0)
+        env.step(np.zeros(env.action_space.shape or ()))
+        env.close()
+        print(f"{robot}: ready after {time.monotonic() - start:.1f} s", flush=True)
+    print(f"Kernels are in {cache_folder()}")
 
 
 @dataclass(frozen=True, slots=True)

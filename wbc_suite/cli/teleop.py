@@ -232,7 +232,7 @@ def drive(
             page = PageProcess(session, *address, label=label)
         if device is not None:
             device.start()
-        print("Compiling; this takes a few seconds the first time ...", flush=True)
+        print("Preparing the controllers ...", flush=True)
         session.tick()
         if isinstance(device, Headset):
             device.show(SessionView(session, f"{robots} · {benchmark}"))

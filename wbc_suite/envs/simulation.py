@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from contextlib import nullcontext
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from wbc_suite.compiling import announced, as_argument, is_compiling, plain
+from wbc_suite.compiling import as_argument, is_compiling, plain
 from wbc_suite.control import CompositeController, RobotState, SteppedController
 from wbc_suite.control.composite.protocols import (
     ResumableController,
@@ -78,7 +77,6 @@ class Simulation:
         self.controllers = tuple(controller for _, controller in pairs)
         self.pairs = tuple(pairs)
         self._left = np.zeros(len(pairs), dtype=np.int64)
-        self._prepared = False
         self.loop_calls = 1
         self._stepped = [(r, c) for r, c in pairs if isinstance(c, SteppedController)]
         compiled = compiled and is_compiling()
@@ -117,8 +115,7 @@ class Simulation:
         self._last = ticks, tuple(map(as_argument, self._sources)) or None
         self.memory = self._make_memory()
         self._new = self.memory.read()
-        with announced("the control loop"):
-            self._call_loop(0)
+        self._call_loop(0)
 
     def _make_memory(self) -> Memory:
         """Return what laws, controllers and sensors go on from."""
@@ -187,9 +184,7 @@ class Simulation:
         """
         if self.timestep != self._made_for:
             check_model(self.model, self._made_for)
-        with nullcontext() if self._prepared else announced("the controllers"):
-            self._advance(n)
-        self._prepared = True
+        self._advance(n)
         if not self.lite:
             self._refresh()
 
@@ -227,7 +222,11 @@ class Simulation:
         needed = self._laws[[*DECIDING]].tobytes()
         if needed != self._needed:
             kernels, self._owner = bind_kernels(
-                self._laws, self._physics, self._bodies, compiled=not self._runs_plain
+                self._laws,
+                self._physics,
+                self._bodies,
+                self._last[0],
+                compiled=not self._runs_plain,
             )
             records = *self._records, kernels, self._bodies
             self._law_arguments = self._physics, *records

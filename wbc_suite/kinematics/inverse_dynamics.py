@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import inner, struct
+from wbc_suite.compiling import compiled_inline, inner, struct
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.typing import Matrix, Vector
 
@@ -46,7 +46,7 @@ def inertia_arrays(model: pin.Model) -> InertiaArrays:
     )
 
 
-@inner
+@compiled_inline
 def compute_torques(
     robot: RobotArrays, inertias: InertiaArrays, v: Vector, a: Vector, tau: Vector
 ) -> None:

@@ -17,7 +17,7 @@ def integrate_joints(robot: RobotArrays, dq: Vector) -> None:
     robot.is_current[0] = robot.is_current[1] = robot.is_current[2] = 0
 
 
-@inner
+@compiled
 def integrate(robot: RobotArrays, q: Vector, dq: Vector) -> None:
     """Move q in place: `q (+) dq`; the robot has no joint of kind `OTHER`."""
     kinds, q_start, v_start = robot.kind, robot.q_start, robot.v_start
@@ -29,7 +29,7 @@ def integrate(robot: RobotArrays, q: Vector, dq: Vector) -> None:
             q[k] += dq[i]
 
 
-@inner
+@compiled
 def difference(robot: RobotArrays, origin: Vector, q: Vector, out: Vector) -> None:
     """Write `q (-) origin`, shape (nv,); the robot has no joint of kind `OTHER`."""
     kinds, q_start, v_start = robot.kind, robot.q_start, robot.v_start

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from wbc_suite.compiling import inner
+from wbc_suite.compiling import compiled, inner
 from wbc_suite.locomotion.gait import Gait, Measured, heading_axes
 from wbc_suite.typing import Matrix, Vector
 
 
-@inner
+@compiled
 def keep_in_soles(
     gait: Gait, measured: Measured, point: Vector, foot: int, out: Vector
 ) -> float:

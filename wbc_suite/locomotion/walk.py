@@ -313,7 +313,7 @@ def _landing_place(
     return np.sqrt((x - near_x) ** 2 + (y - near_y) ** 2)
 
 
-@inner
+@compiled
 def _choose_duration(
     gait: Gait,
     measured: Measured,

@@ -47,9 +47,9 @@ def damp_overshoot(
     place, moved = 0, False
     for k in range(count):
         tasks = levels[k].tasks
-        place, moved = _keep(past.targets, place, tasks.target.ravel(), moved)
-        place, moved = _keep(past.targets, place, tasks.joint_target.ravel(), moved)
-    place, moved = _keep(past.targets, place, held.target.ravel(), moved)
+        place, moved = _keep(past.targets, place, tasks.target, moved)
+        place, moved = _keep(past.targets, place, tasks.joint_target, moved)
+    place, moved = _keep(past.targets, place, held.target, moved)
     past.at_rest[0] = 0.0 if moved else past.at_rest[0] + dt
     overshoots, before = False, past.before
     for i in range(v.shape[0]):
@@ -74,11 +74,12 @@ def turned(v: float, before: float, change: float) -> bool:
 
 
 @inner
-def _keep(kept: Vector, place: int, now: Vector, moved: bool) -> tuple[int, bool]:
+def _keep(kept: Vector, place: int, now: Matrix, moved: bool) -> tuple[int, bool]:
     """Copy targets to their place; return the next one, and if any has moved."""
-    for value in now:
-        old = kept[place]
-        moved |= old != value and (old == old or value == value)  # NaN rests
-        kept[place] = value
-        place += 1
+    for i in range(now.shape[0]):
+        for j in range(now.shape[1]):
+            old, value = kept[place], now[i, j]
+            moved |= old != value and (old == old or value == value)  # NaN rests
+            kept[place] = value
+            place += 1
     return place, moved

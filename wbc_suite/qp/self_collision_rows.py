@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, inner, struct
+from wbc_suite.compiling import compiled, compiled_inline, inner, struct
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.linear_algebra import copy_rows
 from wbc_suite.qp.problem import UNBOUNDED
@@ -58,7 +58,7 @@ def self_collision_rows(
         h[row] = min(max(speed, -SEPARATION) * dt, UNBOUNDED)
 
 
-@inner
+@compiled_inline
 def _find_nearest(robot: RobotArrays, capsules: CapsuleArrays) -> None:
     """Find the nearest pairs within the influence, and their distances."""
     _place_capsules(robot, capsules)

@@ -30,6 +30,7 @@ from wbc_suite.qp.tick import (
     TOLERANCE,
     TickArrays,
     TickStatus,
+    bind_kernels,
     finish_level,
     solve_tick,
 )
@@ -155,9 +156,17 @@ class TaskStack:
             at_rest=np.zeros(1),
         )
         levels = tuple(as_argument(level.arrays) for level in self.levels)
+        all_levels = (*levels, *levels[-1:] * (MAX_LEVELS - len(levels)))
         return TickArrays(
+            kernels=bind_kernels(
+                self.configuration.robot,
+                self.levels[0].arrays,
+                all_levels,
+                rows,
+                strict=len(levels) > 1,
+            ),
             robot=self.configuration.robot,
-            levels=(*levels, *levels[-1:] * (MAX_LEVELS - len(levels))),
+            levels=all_levels,
             level_count=len(levels),
             bounds=self.bounds,
             kinds=np.zeros(2 * nv, dtype=np.int64),

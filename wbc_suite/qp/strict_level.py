@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from wbc_suite.compiling import inner, struct
+from wbc_suite.compiling import compiled_inline, inner, struct
 from wbc_suite.linear_algebra import copy_rows, dot, row_space, subtract_projection
 from wbc_suite.qp.active_set import QpArrays
 from wbc_suite.qp.problem import UNBOUNDED
@@ -58,7 +58,7 @@ def restrict_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
         qp.lower[nv + row] = -UNBOUNDED if row < p else y
 
 
-@inner
+@compiled_inline
 def _decided_directions(rows: Matrix, V: Matrix, level: LevelArrays) -> int:
     """Write an orthonormal basis of what the levels above decide; return its size.
 

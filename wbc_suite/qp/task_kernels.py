@@ -82,8 +82,8 @@ def write_tasks(
         mu += curvature * bending
         total += size
     _write_joint_tasks(robot, tasks, dt)
-    for value in tasks.diagonal.flat:
-        total += abs(value)
+    for i in range(tasks.diagonal.shape[1]):
+        total += abs(tasks.diagonal[0, i]) + abs(tasks.diagonal[1, i])
     tasks.mu[0] = mu
     return bool(np.isfinite(mu + total))
 

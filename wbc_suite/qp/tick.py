@@ -6,15 +6,24 @@ the caller solves that level by other means, writes the result into the level's 
 calls `finish_level`, and calls `solve_tick` again for the levels below.
 """
 
+from collections.abc import Callable
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, inner, struct
+from wbc_suite.compiling import (
+    as_argument,
+    by_address,
+    compiled,
+    compiled_inline,
+    inner,
+    struct,
+)
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.qp.active_set import QpArrays, solve_warm
+from wbc_suite.qp.constraints import Constraints
 from wbc_suite.qp.equality import HeldFrames, hold_frames
 from wbc_suite.qp.floor_limit import SphereArrays, floor_rows
 from wbc_suite.qp.limit import JointBounds, merge_bounds
@@ -24,7 +33,7 @@ from wbc_suite.qp.problem import UNBOUNDED, worst_violation
 from wbc_suite.qp.self_collision_rows import CapsuleArrays, self_collision_rows
 from wbc_suite.qp.strict_level import LevelArrays, restrict_level
 from wbc_suite.qp.task_kernels import TaskArrays, write_tasks
-from wbc_suite.typing import Indices, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 TOLERANCE = 1e-7  # m or rad; a step that violates a row or bound by more is not taken
 RETURN_WEIGHT = 1e2  # of a soft row, against the stiffest joint's cost
@@ -43,6 +52,29 @@ class TickStatus(IntEnum):
 
 
 @struct
+class TickKernels(NamedTuple):
+    """Kernels of a tick by their addresses; what a stack does not use does nothing.
+
+    Attributes:
+        write_tasks: See `task_kernels`.
+        solve: See `active_set`.
+        restrict: See `strict_level`.
+        collision: See `self_collision_rows`.
+        floor: See `floor_limit`.
+        obstacles: See `obstacle_limit`.
+        hold: See `equality`.
+    """
+
+    write_tasks: Callable[..., bool]
+    solve: Callable[..., bool]
+    restrict: Callable[..., None]
+    collision: Callable[..., None]
+    floor: Callable[..., None]
+    obstacles: Callable[..., None]
+    hold: Callable[..., None]
+
+
+@struct
 class TickArrays(NamedTuple):
     """What a tick reads and writes: p inequality rows, k equality rows.
 
@@ -52,6 +84,7 @@ class TickArrays(NamedTuple):
     back to the second entry.
     """
 
+    kernels: TickKernels
     robot: RobotArrays  # its q is where the tick begins
     levels: tuple[LevelArrays, ...]
     level_count: int
@@ -79,6 +112,55 @@ class TickArrays(NamedTuple):
     warm: bool  # whether the active set of the last tick is tried
 
 
+def bind_kernels(
+    robot: RobotArrays,
+    first: LevelArrays,
+    levels: tuple[LevelArrays, ...],
+    rows: Constraints,
+    *,
+    strict: bool,
+) -> TickKernels:
+    """Return the kernels that a stack needs, as its argument.
+
+    Args:
+        robot: The robot, as kernels get it.
+        first: The first level.
+        levels: All levels, as kernels get them.
+        rows: Limits and equalities.
+        strict: Whether there are several levels.
+    """
+    tasks, qp, n = first.tasks, first.qp, 1
+    matrix, vector = np.zeros((n, n)), np.zeros(n)
+
+    def rows_of(kernel: Any, arrays: Any, is_used: bool) -> Any:
+        used = kernel if is_used else no_rows
+        return by_address(used, robot, arrays, 0.0, matrix, vector)
+
+    collision, floor = rows.collision_rows.any(), rows.floor_rows.any()
+    found = TickKernels(
+        write_tasks=by_address(write_tasks, robot, tasks, 0.0, 0.0, 0.0),
+        solve=by_address(solve_warm, qp),
+        restrict=by_address(restrict_level if strict else no_level, levels, n, vector),
+        collision=rows_of(self_collision_rows, rows.collision.argument, collision),
+        floor=rows_of(floor_rows, rows.floor.argument, floor),
+        obstacles=rows_of(
+            obstacle_rows, rows.obstacles.argument, rows.obstacle_rows.any()
+        ),
+        hold=rows_of(hold_frames, rows.held, len(rows.held_arrays.target) > 0),
+    )
+    return as_argument(found)
+
+
+@inner
+def no_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
+    """Do nothing: there is one level."""
+
+
+@inner
+def no_rows(robot: RobotArrays, arrays: Any, dt: float, G: Matrix, h: Vector) -> None:
+    """Do nothing: there are no such rows."""
+
+
 @compiled
 def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
     """Solve the levels from `start` on; 0 begins a tick, of dt seconds.
@@ -89,7 +171,7 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
     if start == 0 and not tick.prepared[0]:
         return TickStatus.NEEDS_PYTHON.value, 0
     tick.prepared[0] = tick.prepared[1]
-    levels = tick.levels
+    levels, kernels = tick.levels, tick.kernels
     for k in range(start, tick.level_count):
         level, damping = levels[k], tick.damping
         if k == 0:
@@ -99,13 +181,14 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
             damping += tick.pressure_damping[0]
             damping += damp_overshoot(past, levels, tick.level_count, held, tick.v, dt)
         else:
-            restrict_level(levels, k, tick.x)
+            kernels.restrict(levels, k, tick.x)
             damping = levels[k - 1].tasks.mu[0]
-        if not write_tasks(tick.robot, level.tasks, dt, damping, tick.curvature):
+        robot, curvature = tick.robot, tick.curvature
+        if not kernels.write_tasks(robot, level.tasks, dt, damping, curvature):
             return TickStatus.BAD_ROWS.value, k
         if k == 0 and level.qp.counts[0] > 0:  # the cost of soft rows
             level.qp.weight[0] = RETURN_WEIGHT * stiffness(level.tasks)
-        if not tick.warm or not solve_warm(level.qp) or not _is_feasible(tick, k):
+        if not tick.warm or not kernels.solve(level.qp) or not _is_feasible(tick, k):
             return TickStatus.UNSOLVED.value, k
         finish_level(tick, k, dt, True)
     for i in range(tick.x.shape[0]):
@@ -131,7 +214,7 @@ def finish_level(tick: TickArrays, k: int, dt: float, kept: bool) -> None:
             tick.pressure_damping[0] = max(tick.pressure_damping[0], pressure)
 
 
-@inner
+@compiled_inline
 def _begin_tick(tick: TickArrays, dt: float) -> bool:
     """Write bounds and limit rows; return whether the configuration is finite."""
     robot, qp, total = tick.robot, tick.levels[0].qp, 0.0
@@ -149,7 +232,7 @@ def _begin_tick(tick: TickArrays, dt: float) -> bool:
     return True
 
 
-@inner
+@compiled_inline
 def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     """Write the rows of limits and equalities that have a kernel; relax all limits.
 
@@ -160,16 +243,13 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     """
     p, k, nv = qp.counts[0], qp.counts[1], tick.x.shape[0]
     robot, h = tick.robot, qp.upper[nv : nv + p]
+    kernels, G = tick.kernels, qp.rows
     first, last = tick.collision_rows[0], tick.collision_rows[1]
-    if last > first:
-        G, near = qp.rows[first:last], h[first:last]
-        self_collision_rows(robot, tick.capsules, dt, G, near)
+    kernels.collision(robot, tick.capsules, dt, G[first:last], h[first:last])
     first, last = tick.floor_rows[0], tick.floor_rows[1]
-    if last > first:
-        floor_rows(robot, tick.spheres, dt, qp.rows[first:last], h[first:last])
+    kernels.floor(robot, tick.spheres, dt, G[first:last], h[first:last])
     first, last = tick.obstacle_rows[0], tick.obstacle_rows[1]
-    if last > first:
-        obstacle_rows(robot, tick.obstacles, dt, qp.rows[first:last], h[first:last])
+    kernels.obstacles(robot, tick.obstacles, dt, G[first:last], h[first:last])
     for row in range(p):
         wanted = h[row]
         h[row] = max(wanted, 0.0, -2.0 * (wanted + tick.relax_speed[row] * dt))
@@ -178,12 +258,12 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     for row in range(k):
         if np.isfinite(tick.rate[row]):
             b[row] = tick.rate[row] * dt
-    hold_frames(robot, tick.held, dt, qp.rows[p:], b)
+    kernels.hold(robot, tick.held, dt, G[p:], b)
     for row in range(k):
         qp.lower[nv + p + row] = b[row]
 
 
-@inner
+@compiled
 def stiffness(tasks: TaskArrays) -> float:
     """Return the largest entry of H without damping, or 1."""
     stiffest, W = 1.0, tasks.W

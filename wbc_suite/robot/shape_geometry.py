@@ -9,7 +9,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 from scipy.spatial import ConvexHull, QhullError
 
 from wbc_suite.errors import DescriptionError
@@ -246,6 +245,8 @@ def _smooth_sections(shape: Loft) -> Matrix:
         np.arange(len(knots)),
         knots,
     )
+    from scipy.interpolate import PchipInterpolator  # takes 0.4 s to import
+
     curve = PchipInterpolator(given[:, 0], given[:, 1:])
     return np.column_stack([x, curve(x)])
 

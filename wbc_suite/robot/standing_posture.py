@@ -2,7 +2,6 @@
 
 import numpy as np
 import pinocchio as pin
-from scipy.optimize import least_squares
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame
@@ -101,6 +100,8 @@ def _bent_leg(
 
     signs = np.sign([along[joint] for joint in hinges])
     start: Vector = np.clip(signs * np.asarray(angles), low, high)
+    from scipy.optimize import least_squares  # takes 0.3 s to import
+
     best = least_squares(residuals, start, bounds=(low - 1e-9, high + 1e-9))
     if not np.linalg.norm(best.fun) < TOLERANCE:
         return {}

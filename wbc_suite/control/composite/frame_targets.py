@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import as_argument, compiled, inner, struct
+from wbc_suite.compiling import as_argument, compiled, compiled_inline, inner, struct
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.part.approach import approach_speed, step_share
 from wbc_suite.kinematics import Configuration
@@ -80,7 +80,7 @@ class PostureArrays(NamedTuple):
     braking: Vector
 
 
-@inner
+@compiled_inline
 def write_targets(
     robot: RobotArrays,
     frames: FrameArrays,

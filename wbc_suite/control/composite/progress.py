@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, inner, struct
+from wbc_suite.compiling import compiled, compiled_inline, inner, struct
 from wbc_suite.control.composite.frame_targets import (
     FrameArrays,
     PostureArrays,
@@ -155,7 +155,7 @@ def _is_far(frames: FrameArrays, far: Vector) -> bool:
     return False
 
 
-@inner
+@compiled_inline
 def _is_stuck(
     progress: ProgressArrays, robot: RobotArrays, frames: FrameArrays
 ) -> bool:

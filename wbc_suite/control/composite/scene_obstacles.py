@@ -7,7 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from wbc_suite.compiling import as_argument, compiled, inner, struct
+from wbc_suite.compiling import as_argument, compiled, compiled_inline, inner, struct
 from wbc_suite.control.composite.commanded_scene import (
     CommandedArrays,
     CommandedScene,
@@ -175,7 +175,7 @@ class SceneObstacles:
                 write_plane(self.argument, row, distance)
 
 
-@inner
+@compiled_inline
 def measure_obstacles(scene: SceneArrays) -> None:
     """Write the planes between the robot and the obstacles that are nearest to it."""
     place_commanded(scene.commanded)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from wbc_suite.compiling import (
-    announced,
     as_argument,
     by_address,
     compiled,
@@ -330,8 +329,7 @@ def _planner(planner: Planner, gait: Gait, *, feet: int) -> Planner:
     """Return a planner as the loop calls it, the same type for all of them."""
     values = gait, make_measured(feet), np.zeros(4), 0.0, make_plan(feet)
     arguments = (as_argument(x) if isinstance(x, tuple) else x for x in values)
-    with announced("the gait"):
-        return by_address(planner, *arguments)
+    return by_address(planner, *arguments)
 
 
 def _make_state(*, is_free: bool) -> Records:

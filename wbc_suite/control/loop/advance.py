@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from wbc_suite.compiling import compiled_nogil, inner
-from wbc_suite.control.composite.tick import Ticks, run_tick
+from wbc_suite.compiling import compiled_inline, compiled_nogil
+from wbc_suite.control.composite.tick import Ticks
 from wbc_suite.control.dynamics.state_source import (
     Sources,
     pass_commands,
@@ -69,7 +69,7 @@ def advance(
     if not check_before(state):
         return -1
     done = 0
-    while done < steps and _run_ticks(physics, laws, drives, ticks):
+    while done < steps and _run_ticks(physics, laws, drives, kernels, ticks):
         mj_step1(model, data)
         if sources is not None:
             read_all_sensors(sources)
@@ -87,20 +87,25 @@ def advance(
     return done if check_after(state) else -1
 
 
-@inner
+@compiled_inline
 def _run_ticks(
-    physics: Physics, laws: CompiledRecords, drives: CompiledRecords, ticks: Ticks
+    physics: Physics,
+    laws: CompiledRecords,
+    drives: CompiledRecords,
+    kernels: LoopKernels,
+    ticks: Ticks,
 ) -> bool:
     """Run the ticks that are due; return whether all of them are done."""
     if ticks is not None:
         for tick in ticks:
-            is_due = tick.state[0].countdown <= 0
-            if is_due and not run_tick(tick, physics.qpos, physics.qvel, laws, drives):
-                return False
+            if tick.state[0].countdown <= 0:
+                qpos, qvel = physics.qpos, physics.qvel
+                if not kernels.run_tick(tick, qpos, qvel, laws, drives):
+                    return False
     return True
 
 
-@inner
+@compiled_inline
 def _count_down(ticks: Ticks) -> None:
     """Count the physics steps until the next ticks."""
     if ticks is not None:

@@ -9,7 +9,6 @@ from numba import errors
 
 from wbc_suite.compiling import (
     Callback,
-    announced,
     as_argument,
     by_address,
     compiled,
@@ -17,6 +16,7 @@ from wbc_suite.compiling import (
     plain,
     struct,
 )
+from wbc_suite.control.composite.tick import run_tick
 from wbc_suite.control.dynamics.solve_tick import solve_whole_body, write_whole_body
 from wbc_suite.control.law.custom import law_kernel
 from wbc_suite.control.law.joint_laws import base_law, joint_law, velocity_law
@@ -47,6 +47,7 @@ class LoopKernels(NamedTuple):
             arms are far from their limits.
         keep_direction: See `osc_saturation`.
         observe: See `disturbance_observer`.
+        run_tick: See `composite.tick`; None without ticks in the loop.
         solve_body: See `solve_tick`; None without robots on their feet.
         write_body: See `solve_tick`.
     """
@@ -55,6 +56,7 @@ class LoopKernels(NamedTuple):
     prepare: Callable[[], None]
     keep_direction: Callable[..., None]
     observe: Callable[..., None]
+    run_tick: Callable[..., bool] | None
     solve_body: Callable[..., bool] | None
     write_body: Callable[..., None] | None
 
@@ -99,7 +101,12 @@ DECIDING = "kind", "observer"
 
 
 def bind_kernels(
-    laws: Records, physics: Physics, bodies: Any = None, *, compiled: bool = True
+    laws: Records,
+    physics: Physics,
+    bodies: Any = None,
+    ticks: Any = None,
+    *,
+    compiled: bool = True,
 ) -> tuple[LoopKernels, object]:
     """Return the kernels that laws need, and write their places into the laws.
 
@@ -109,6 +116,7 @@ def bind_kernels(
         laws: `LAW` records.
         physics: The argument that kernels get.
         bodies: Robots on their feet, as kernels get them; None without any.
+        ticks: Whole-body ticks that run in the loop; None without any.
         compiled: Whether kernels are compiled, or plain Python.
 
     Raises:
@@ -125,10 +133,10 @@ def bind_kernels(
         return by_address(kernel, *arguments) if compiled else plain(kernel)
 
     def prepare() -> None:
-        with announced("the law of saturated arms"):
-            adopt(found, address(nothing), address(keep_direction, *of_laws))
+        adopt(found, address(nothing), address(keep_direction, *of_laws))
 
-    of_laws = physics, law, drives
+    of_laws, numbers = (physics, law, drives), np.zeros(0)
+    of_tick = numbers, numbers, laws, drives
     kernels = [address(no_law, *of_laws)] * MOST_KINDS
     for k, kind in enumerate(kinds, 1):
         kernels[k] = address(_LAWS.get(kind) or law_kernel(kind), *of_laws)
@@ -140,6 +148,7 @@ def bind_kernels(
         prepare=owner if compiled else nothing,
         keep_direction=kernels[0] if compiled else plain(keep_direction),
         observe=address(observe, physics, laws, drives, bodies),
+        run_tick=ticks and address(run_tick, ticks[0], *of_tick),
         solve_body=bodies and address(solve_whole_body, physics, bodies[0]),
         write_body=bodies and address(write_whole_body, physics, bodies[0]),
     )
