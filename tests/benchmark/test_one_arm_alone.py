@@ -20,6 +20,8 @@ def hold(monkeypatch, task, holding):
         for measure in ("grasps", "clamps"):
             monkeypatch.setattr(hand, measure, lambda *_, holds=holds: holds)
         monkeypatch.setattr(hand, "friction", lambda _: math.inf)
+    holders = [hand for hand, holds in zip(task.hands, holding, strict=True) if holds]
+    monkeypatch.setattr(task.scene, "hands_at", lambda _: holders)
 
 
 @pytest.mark.parametrize(("robots", "way"), WAYS)
