@@ -32,7 +32,7 @@ class World:
     def __init__(self, env: RobotEnv) -> None:
         self.env, self.task = env, env.benchmark
         self.model, self.data = env.simulation.model, env.simulation.data
-        self.placed: Callable[[str], bool] | None = None
+        self.placed: Callable[[str], bool] = lambda name: False
         self._shapes: dict[tuple[int, bytes], Matrix] = {}
         model = self.model
         names = [model.body(k).name for k in range(model.nbody)]
@@ -148,7 +148,8 @@ class World:
         yield (0.02 - v) / 0.01
         yield (0.2 - w) / 0.1
         moved = (0.003 - self.moved(name)) / 0.002
-        yield max(moved, -0.5) if self.stays_placed(name) else moved
+        tips = moved < -1.0 and self.stays_placed(name)
+        yield -0.5 if tips else moved
 
     def stays_placed(self, name: str) -> bool:
         """Whether what comes to rest after tipping is where it belongs, all the same.
@@ -156,7 +157,7 @@ class World:
         What stands on an edge tips as slowly as one likes, so that no bound of its
         speed keeps it from moving later.
         """
-        return self.placed is not None and self.after(1.5, lambda: self.placed(name))
+        return self.after(1.5, lambda: self.placed(name))
 
     def clamped(self, name: str, hands: Iterable[Any]) -> Iterator[float]:
         """Yield the margins of hands that hold a thing whichever way it is pulled.
