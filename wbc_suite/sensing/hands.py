@@ -69,6 +69,18 @@ class Hand:
             for (a, n), (b, m) in itertools.combinations(touching, 2)
         )
 
+    def friction(self, geoms: Collection[int]) -> float:
+        """Return the friction that the gripper can exert on an object, N.
+
+        It is the sum of mu F_n over their contacts.
+        """
+        most, force = 0.0, np.zeros(6)
+        for k, (a, b) in enumerate(pairs_in_contact(self._data)):
+            if (self.owns(a) and b in geoms) or (self.owns(b) and a in geoms):
+                mujoco.mj_contactForce(self._model, self._data, k, force)
+                most += self._data.contact.friction.item(k, 0) * force.item(0)
+        return most
+
     def slip(self, body: int) -> float:
         """Return the speed of a body's centre of mass relative to the hand, m/s.
 

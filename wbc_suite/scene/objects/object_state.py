@@ -65,6 +65,12 @@ class ObjectState:
         return self._q >= 0
 
     @property
+    def weight(self) -> float:
+        """Its weight, N."""
+        gravity = float(np.linalg.norm(self.model.opt.gravity))
+        return self.model.body_subtreemass.item(self.body) * gravity
+
+    @property
     def is_still(self) -> bool:
         """Whether it moves less than 0.02 m/s and 0.2 rad/s; fixed ones do not move."""
         v = self.data.qvel[self._v : self._v + 6] if self.is_free else np.zeros(6)
