@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from types import MappingProxyType
 from typing import Any, Generic, TypeAlias, TypeVar
 
@@ -23,7 +23,6 @@ from wbc_suite.scene.objects.grasp_site import GraspSite
 from wbc_suite.sensing.hands import Hand, pairs_in_contact
 from wbc_suite.typing import Vector
 
-MISS = 0.005  # m, by which fingers may be beside their way
 NONE: Mapping[str, float] = MappingProxyType({})
 T = TypeVar("T")
 B = TypeVar("B", bound=ObjectBenchmark)
@@ -140,11 +139,11 @@ class Workcell(Generic[B]):
         but: str,
         fingers: Mapping[str, float] = NONE,
         along: Vector | None = None,
+        beside: float = 0.0,
     ) -> float:
         """Return how deep a robot at a configuration is in anything but an object, m.
 
-        Contacts that there are already do not count. Things that can move count as if
-        they were larger by `MISS`.
+        Contacts that there are already do not count.
 
         Args:
             arm: An arm of the robot.
@@ -152,6 +151,8 @@ class Workcell(Generic[B]):
             but: The object.
             fingers: Joints of the gripper that are elsewhere than now.
             along: Unit vector in the world, if only depth along it counts.
+            beside: By how much the robot may miss its way, m: things that can move
+                count as if they were larger by it.
         """
         data, state = self._copy, arm.state
         data.qpos[:] = self.data.qpos
@@ -159,11 +160,11 @@ class Workcell(Generic[B]):
         for joint, value in fingers.items():
             data.joint(state.prefix + joint).qpos = value
         mujoco.mj_kinematics(self.model, data)
-        with contacts_within(self.model, MISS):
+        with contacts_within(self.model, beside) if beside else nullcontext():
             mujoco.mj_collision(self.model, data)
         present = {(a, b) for a, b in pairs_in_contact(self.data)}
         moves = self._is_thing[data.contact.geom].any(axis=1)
-        depths = MISS * moves - data.contact.dist
+        depths = beside * moves - data.contact.dist
         if along is not None:
             depths = depths * np.abs(data.contact.frame[:, :3] @ along)
         object_geoms, deepest = self.object(but).geoms, 0.0
