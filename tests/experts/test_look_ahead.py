@@ -162,6 +162,19 @@ def test_a_hand_beside_its_way_stays_back():
 
 
 @pytest.mark.slow
+def test_a_hand_presses_nothing_into_the_table():
+    """Scene 9019: a finger that missed its way by 4 mm pressed cube B 25 mm deep."""
+    env = wbc_suite.make("Stack", robots="Panda", horizon=120)
+    env.reset(seed=9019)
+    policy, deepest = make_policy("expert", env, 9019), 0.0
+    for _ in range(120):
+        *_, info = env.step(policy({}))
+        deepest = max(deepest, info["penetration"])
+    assert info["success"]
+    assert 0.0 < deepest < 0.003
+
+
+@pytest.mark.slow
 def test_a_cube_that_slips_away_is_grasped_again():
     env = wbc_suite.make("Lift", robots="Panda", horizon=300)
     env.reset(seed=3)

@@ -435,6 +435,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     def _info(self, clipped: int, success: bool) -> dict[str, Any]:
         info = {"success": success, "is_success": success, "clipped": clipped}
         info["control_freq"] = self.config.control_freq
+        distances = self.simulation.data.contact.dist
+        info["penetration"] = max(0.0, -float(distances.min(initial=0.0)))
         for state, controller in self.simulation.pairs:
             before = state.prefix if len(self.controllers) > 1 else ""
             info |= {before + k: v for k, v in controller.info(state).items()}

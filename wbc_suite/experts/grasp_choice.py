@@ -21,6 +21,7 @@ OVERLAP = 200.0  # cost of what hands meet on the way, 1/m
 ANGLE = 0.4  # cost of an approach that deviates from the wanted one, 1/rad
 CLEAR = 0.001  # m, between fingers and what an object lies on
 ROOM = 0.006  # m, between fingers and what is behind an object: hands miss by 4 mm
+MISS = 0.005  # m, between fingers and things beside an object, likewise
 MOST_LIFT = 0.03  # m, by which hands stay back for that
 STEEP = 0.7  # cosine, of approaches from above
 PAIRED = 8  # grasps of each arm that are looked at with those of the other
@@ -277,4 +278,6 @@ def _overlap_while_closing(
     before, at, up = map(arm.configuration, outlook.q)
     closing = arm.closing(grasp)
     moments = [(before, closing[0]), *((at, f) for f in closing), (up, closing[-1])]
-    return max(cell.overlap(arm, q, but=name, fingers=f) for q, f in moments)
+    return max(
+        cell.overlap(arm, q, but=name, fingers=f, beside=MISS) for q, f in moments
+    )

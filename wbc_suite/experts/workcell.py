@@ -1,9 +1,10 @@
 """What an expert sees and moves: arms, objects, and the action of both."""
 
 import itertools
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from types import MappingProxyType
-from typing import Generic, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import mujoco
 import numpy as np
@@ -46,6 +47,9 @@ class Workcell(Generic[B]):
         self._env, self.benchmark, self.rng = env, benchmark, rng
         self.model, self.data = env.simulation.model, env.simulation.data
         self._copy = mujoco.MjData(self.model)
+        free = [g for s in benchmark.states.values() if s.is_free for g in s.geoms]
+        self._is_thing = np.zeros(self.model.ngeom, dtype=bool)
+        self._is_thing[free] = True
         self._objects = dict(benchmark.states)
         self.period = 1.0 / env.config.control_freq
         ports = [*limb_ports(env).values()]
@@ -135,6 +139,7 @@ class Workcell(Generic[B]):
         but: str,
         fingers: Mapping[str, float] = NONE,
         along: Vector | None = None,
+        beside: float = 0.0,
     ) -> float:
         """Return how deep a robot at a configuration is in anything but an object, m.
 
@@ -146,6 +151,8 @@ class Workcell(Generic[B]):
             but: The object.
             fingers: Joints of the gripper that are elsewhere than now.
             along: Unit vector in the world, if only depth along it counts.
+            beside: By how much the robot may miss its way, m: things that can move
+                count as if they were larger by it.
         """
         data, state = self._copy, arm.state
         data.qpos[:] = self.data.qpos
@@ -153,9 +160,11 @@ class Workcell(Generic[B]):
         for joint, value in fingers.items():
             data.joint(state.prefix + joint).qpos = value
         mujoco.mj_kinematics(self.model, data)
-        mujoco.mj_collision(self.model, data)
+        with contacts_within(self.model, beside) if beside else nullcontext():
+            mujoco.mj_collision(self.model, data)
         present = {(a, b) for a, b in pairs_in_contact(self.data)}
-        depths = -data.contact.dist
+        moves = self._is_thing[data.contact.geom].any(axis=1)
+        depths = beside * moves - data.contact.dist
         if along is not None:
             depths = depths * np.abs(data.contact.frame[:, :3] @ along)
         object_geoms, deepest = self.object(but).geoms, 0.0
@@ -218,6 +227,19 @@ def _joints(state: RobotState, controller: object, hand: Hand) -> tuple[str, ...
         return tuple(name for name in names if name not in held)
     part = parts.get(hand.name) or next(iter(parts.values()))
     return part.law.joints
+
+
+@contextmanager
+def contacts_within(model: mujoco.MjModel, distance: float) -> Iterator[None]:
+    """Let collision detection find what is nearer than a distance, m, in the block."""
+    option: Any = model.opt
+    flags, margin = option.enableflags, option.o_margin
+    option.enableflags = flags | mujoco.mjtEnableBit.mjENBL_OVERRIDE
+    option.o_margin = distance
+    try:
+        yield
+    finally:
+        option.enableflags, option.o_margin = flags, margin
 
 
 def together(*skills: Steps[T]) -> Steps[list[T]]:
