@@ -32,7 +32,11 @@ def started(env):
 
 
 def carry(env, monkeypatch, steps=30, hands=2):
-    """Let the pot be in the air for some actions, touched by some hands."""
+    """Let the pot be in the air for some actions, touched by some hands.
+
+    With a robot's own hands the expert carries it in tests/experts/test_experts.py: a
+    pot that lacks one of them for `alone` seconds in the air is no success there.
+    """
     with monkeypatch.context() as held:
         held.setattr(env.benchmark, "hands_at_pot", lambda: hands)
         put_pot(env, -0.6, 0.8, 1.2)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from wbc_suite.errors import ConfigError
 from wbc_suite.evaluation import (
@@ -109,6 +110,13 @@ def test_a_bootstrap_of_nothing_is_refused():
     for strata in ([], [[]]):
         with pytest.raises(ConfigError, match="none empty"):
             stratified_bootstrap(strata, mean)
+
+
+@pytest.mark.parametrize("count", range(1, 10))
+def test_interquartile_mean_is_scipys_trimmed_mean(count):
+    scores = np.random.default_rng(count).normal(size=count)
+    expected = stats.trim_mean(scores, 0.25)
+    assert interquartile_mean(scores) == pytest.approx(expected, rel=1e-12)
 
 
 def test_interquartile_mean_leaves_out_the_outer_quarters():

@@ -3,9 +3,8 @@
 import copy
 import functools
 
-import numpy as np
 import pytest
-from damage import parent_of, places
+from damage import dump, parent_of, places
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -71,27 +70,6 @@ def test_a_damaged_controller_names_source_and_key(data):
     assert text.startswith("my.toml: ")
     assert "key" in text
     assert len(text) < 3000
-
-
-def dump(value):
-    """Write plain data as TOML; inline tables everywhere but at the top."""
-    match value:
-        case bool():
-            return str(value).lower()
-        case float():
-            return "nan" if np.isnan(value) else repr(value)
-        case str():
-            escaped = "".join(f"\\U{ord(c):08X}" for c in value)
-            return f'"{escaped}"'
-        case dict():
-            return (
-                "{"
-                + ", ".join(f"{dump(k)} = {dump(v)}" for k, v in value.items())
-                + "}"
-            )
-        case list():
-            return "[" + ", ".join(map(dump, value)) + "]"
-    return str(value)
 
 
 @FAST

@@ -8,6 +8,7 @@ from PIL import Image
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.devices.certificate import make_certificate
 from wbc_suite.envs.states import write_scene
 from wbc_suite.evaluation import make_policy
 from wbc_suite.recording import converting
@@ -35,10 +36,12 @@ OF_RECORDINGS = (
     "extract FILE -o extracted.hdf5 --workers 1",
     f"record Lift --device hold {SHORT} -o FILE",
     f"multiply FILE -o more.hdf5 {SHORT}",
+    "replay FILE --show browser --port 0",
+    "serve-policy FILE --port 0",
 )
 OF_PARTS = tuple(
     line.replace("FILE", "lift.hdf5")
-    for line in (*OF_RECORDINGS[:6], "replay FILE", OF_RECORDINGS[-2])
+    for line in (*OF_RECORDINGS[:6], "replay FILE", OF_RECORDINGS[-4])
 )
 OF_ROBOTS = (
     "check FILE",
@@ -46,6 +49,8 @@ OF_ROBOTS = (
     "describe-action FILE",
     "render FILE -o robot.png",
     f"evaluate Lift --robots FILE {EVALUATE}",
+    "view FILE --port 0",
+    "adopt FILE --port 0",
 )
 OF_MESHES = tuple(
     line.replace("FILE", f"arm.{kind}")
@@ -65,13 +70,23 @@ OF_BENCHMARKS = (
     "bench FILE --actions 5",
     f"record FILE --device hold {SHORT} -o new.hdf5",
     f"evaluate FILE {EVALUATE}",
+    "expert FILE --episodes 1 --horizon 3",
 )
 OF_ARENAS = tuple(line.replace("FILE", "mine.toml") for line in OF_BENCHMARKS)
 OF_CONTROLLERS = ("check FILE", "describe-action ROBOT --controller FILE")
+CONTROLLERS = {
+    "GR1": "whole_body_ik",
+    "GR1FreeBody": "whole_body_id",
+    "Tiago": "basic",
+}
 OF_JSON = (
     "check FILE --robot Panda",
     "describe-action Panda --controller FILE",
     f"evaluate Lift --controller FILE {EVALUATE}",
+)
+OF_KEYS = (
+    "teleop Lift --robots Panda --device headset --port 0 --device-option port=0 "
+    "--tls-cert certificate.pem --tls-key key.pem",
 )
 OF_RESULTS = (f"evaluate Lift {EVALUATE}",)
 
@@ -114,6 +129,26 @@ MJCF = """<mujoco>
  <actuator><motor joint="lift" ctrlrange="-50 50"/></actuator>
 </mujoco>
 """
+NESTED = """<mujoco>
+ <include file="parts/joints.xml"/>
+ <asset><model name="tool" file="parts/tool.xml"/></asset>
+ <worldbody><body name="base"><body name="arm">
+  <joint name="lift" class="slow"/><geom size="0.1" mass="1"/>
+  <attach model="tool" body="tool" prefix="own_"/>
+ </body></body></worldbody>
+ <actuator><motor joint="lift" ctrlrange="-50 50"/></actuator>
+</mujoco>
+"""
+PARTS = {
+    "joints.xml": """<mujoco><default><default class="slow">
+ <joint axis="0 0 1" range="-1 1"/></default></default></mujoco>
+""",
+    "tool.xml": """<mujoco>
+ <asset><mesh name="m" file="link0.stl"/></asset>
+ <worldbody><body name="tool"><geom type="mesh" mesh="m" mass="1"/></body></worldbody>
+</mujoco>
+""",
+}
 ROOM = """<mujoco>
  <asset>
   <texture name="t" type="2d" file="wood.png"/><material name="w" texture="t"/>
@@ -179,83 +214,125 @@ def write_meshes(folder):
         trimesh.Trimesh(mesh.vertices, mesh.faces).export(folder / "link0.glb")
 
 
-def write_originals(folder):
-    """Write the files; return folder, name in it and commands of each kind."""
-    shipped = {
-        path.stem: path
-        for kind in ("tasks", "controllers", "robots/arm", "robots")
-        for path in Catalogue().files(kind)
-    }
-    found = {}
+class Originals:
+    """Whole files of each kind: folder, name in it, and commands that read it.
 
-    def add(kind, name, commands, content, *others):
-        path = folder / kind / name
+    Args:
+        folder: Gets a folder for each kind.
+    """
+
+    def __init__(self, folder):
+        self.folder, self.found = folder, {}
+
+    def add(self, kind, name, commands, content, *others):
+        """Write a file, and copy others beside it; return its folder."""
+        path = self.folder / kind / name
         path.parent.mkdir(parents=True)
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         for other in others:
             shutil.copy(other, path.parent)
-        found[kind] = folder / kind, name, commands
+        self.found[kind] = self.folder / kind, name, commands
+        return self.folder / kind
 
-    recording(folder / "lift.hdf5")
-    add("recording", "lift.hdf5", OF_RECORDINGS, (folder / "lift.hdf5").read_bytes())
-    found["part"] = (
-        folder / "parts",
-        next(str(p.relative_to(folder / "parts")) for p in folder.glob("parts/*/*5")),
-        OF_PARTS,
-    )
-    for layout in LAYOUTS[1:]:
-        out = folder / f"{layout}-v0"
-        converting.convert(folder / "lift.hdf5", out, layout)
-        name = next(
-            p for p in (out, *out.rglob("*")) if p.is_file() and p.suffix[1:] != "json"
-        )
-        add(layout, name.name, OF_RECORDINGS, name.read_bytes())
-    panda = load_robot("Panda", gripper="none")
-    add("mjcf", "panda.xml", OF_ROBOTS, write_scene(panda.to_mjspec()))
-    add("urdf", "panda.urdf", OF_ROBOTS, panda.to_urdf())
-    add(
-        "robot",
-        "panda.toml",
-        OF_ROBOTS,
-        Catalogue().find("robots/arm", "panda", kind="").read_bytes(),
-    )
-    add("assembly", "ur5e.toml", OF_ROBOTS, shipped["ur5e"].read_bytes())
-    add("json", "mine.json", OF_JSON, JSON)
-    add("benchmark", "lift.toml", OF_BENCHMARKS, shipped["lift"].read_bytes())
-    for robot, way in {"GR1": "ik", "GR1FreeBody": "id"}.items():
-        name = f"{robot.lower()}_whole_body_{way}"
-        lines = tuple(line.replace("ROBOT", robot) for line in OF_CONTROLLERS)
-        add(name, f"{name}.toml", lines, shipped[name].read_bytes())
-    for kind, name in {"gripper": "panda_gripper", "base": "rethink_mount"}.items():
-        path = Catalogue().find(f"robots/{kind}", name, kind=kind)
-        place = f"robots/{kind}/{name}.toml"
-        add(kind, place, OF_COMPONENTS, path.read_bytes())
-    add("skin", "robots/skin/panda.toml", OF_COMPONENTS, SKIN)
-    meshes = folder / "meshes"
+    def add_recordings(self):
+        """Add a recording, one that is not yet whole, and those of other layouts."""
+        folder = self.folder
+        recording(folder / "lift.hdf5")
+        content = (folder / "lift.hdf5").read_bytes()
+        self.add("recording", "lift.hdf5", OF_RECORDINGS, content)
+        parts = folder / "parts"
+        name = next(str(p.relative_to(parts)) for p in parts.glob("*/*5"))
+        self.found["part"] = parts, name, OF_PARTS
+        for layout in LAYOUTS[1:]:
+            out = folder / f"{layout}-v0"
+            converting.convert(folder / "lift.hdf5", out, layout)
+            name = next(
+                p
+                for p in (out, *out.rglob("*"))
+                if p.is_file() and p.suffix[1:] != "json"
+            )
+            self.add(layout, name.name, OF_RECORDINGS, name.read_bytes())
+
+    def add_robots(self):
+        """Add robots, controllers and components, shipped ones and others'."""
+        panda = load_robot("Panda", gripper="none")
+        self.add("mjcf", "panda.xml", OF_ROBOTS, write_scene(panda.to_mjspec()))
+        self.add("urdf", "panda.urdf", OF_ROBOTS, panda.to_urdf())
+        self.add("robot", "panda.toml", OF_ROBOTS, shipped("robots/arm", "panda"))
+        self.add("assembly", "ur5e.toml", OF_ROBOTS, shipped("robots", "ur5e"))
+        self.add("json", "mine.json", OF_JSON, JSON)
+        for robot, way in CONTROLLERS.items():
+            name = f"{robot.lower()}_{way}"
+            lines = tuple(line.replace("ROBOT", robot) for line in OF_CONTROLLERS)
+            self.add(name, f"{name}.toml", lines, shipped("controllers", name))
+        for kind, name in {"gripper": "panda_gripper", "base": "rethink_mount"}.items():
+            content = shipped(f"robots/{kind}", name)
+            self.add(kind, f"robots/{kind}/{name}.toml", OF_COMPONENTS, content)
+        self.add("skin", "robots/skin/panda.toml", OF_COMPONENTS, SKIN)
+
+    def add_meshes(self, meshes):
+        """Add meshes of a folder, and files that name them."""
+        for kind in (k for k in MESHES if (meshes / f"link0.{k}").exists()):
+            content = (meshes / f"link0.{kind}").read_bytes()
+            own = self.add(kind, f"link0.{kind}", OF_MESHES, content)
+            for end, text in {"urdf": URDF, "xml": MJCF}.items():
+                (own / f"arm.{end}").write_text(text.replace("KIND", kind))
+            lines = OF_COMPONENTS[-2:-1]
+            own = self.add(f"skin_{kind}", f"link0.{kind}", lines, content)
+            (own / "robots/skin").mkdir(parents=True)
+            table = SKIN[: SKIN.index("[{")] + f'[{{ file = "link0.{kind}" }}]\n'
+            (own / "robots/skin/panda.toml").write_text(table)
+
+    def add_nested(self, mesh):
+        """Add a robot in MJCF of several files; each of them is damaged."""
+        files = {"nested": "arm.xml"}
+        files |= {f"nested_{name[:-4]}": f"parts/{name}" for name in PARTS}
+        for kind, name in files.items():
+            lines = tuple(line.replace("FILE", "arm.xml") for line in OF_ROBOTS)
+            own = self.add(kind, name, lines, b"")
+            (own / "arm.xml").write_text(NESTED)
+            (own / "parts").mkdir(exist_ok=True)
+            for part, text in PARTS.items():
+                (own / "parts" / part).write_text(text)
+            shutil.copy(mesh, own / "parts")
+
+    def add_scenes(self, mesh):
+        """Add a benchmark, and one with an arena in MJCF, a texture and a mesh."""
+        lift, folder = shipped("tasks", "lift"), self.folder
+        self.add("benchmark", "lift.toml", OF_BENCHMARKS, lift)
+        Image.new("RGB", (8, 8), "brown").save(folder / "wood.png")
+        task = lift.decode() + '\n[arena]\nfile = "room.xml"\n'
+        (folder / "mine.toml").write_text(task)
+        (folder / "room.xml").write_text(ROOM)
+        room = {"arena": folder / "room.xml", "texture": folder / "wood.png"}
+        room |= {"stone": mesh, "task": folder / "mine.toml"}
+        for kind in ("arena", "texture", "stone"):
+            others = [path for other, path in room.items() if other != kind]
+            content = room[kind].read_bytes()
+            self.add(kind, room[kind].name, OF_ARENAS, content, *others)
+
+    def add_keys(self):
+        """Add a certificate and its key."""
+        pair = [self.folder / f"{kind}.pem" for kind in ("certificate", "key")]
+        make_certificate(*pair)
+        for path in pair:
+            self.add(path.stem, path.name, OF_KEYS, path.read_bytes(), *pair)
+
+
+def shipped(folder, name):
+    """Return the content of a file of the catalogue."""
+    files = Catalogue().files(folder)
+    return next(path for path in files if path.stem == name).read_bytes()
+
+
+def write_originals(folder):
+    """Write whole files of each kind; return folder, name and commands by kind."""
+    originals, meshes = Originals(folder), folder / "meshes"
+    originals.add_recordings()
+    originals.add_robots()
     write_meshes(meshes)
-    for kind in (k for k in MESHES if (meshes / f"link0.{k}").exists()):
-        content = (meshes / f"link0.{kind}").read_bytes()
-        add(kind, f"link0.{kind}", OF_MESHES, content)
-        for end, text in {"urdf": URDF, "xml": MJCF}.items():
-            (folder / kind / f"arm.{end}").write_text(text.replace("KIND", kind))
-        add(f"skin_{kind}", f"link0.{kind}", OF_COMPONENTS[-2:-1], content)
-        (folder / f"skin_{kind}/robots/skin").mkdir(parents=True)
-        table = SKIN[: SKIN.index("[{")] + f'[{{ file = "link0.{kind}" }}]\n'
-        (folder / f"skin_{kind}/robots/skin/panda.toml").write_text(table)
-    Image.new("RGB", (8, 8), "brown").save(folder / "wood.png")
-    stone = meshes / "link0.stl"
-    task = shipped["lift"].read_text() + '\n[arena]\nfile = "room.xml"\n'
-    (folder / "mine.toml").write_text(task)
-    (folder / "room.xml").write_text(ROOM)
-    room = folder / "room.xml", folder / "mine.toml", folder / "wood.png", stone
-    for kind, path in zip(
-        ("arena", "texture", "stone"), (room[0], *room[2:]), strict=True
-    ):
-        add(
-            kind,
-            path.name,
-            OF_ARENAS,
-            path.read_bytes(),
-            *(p for p in room if p != path),
-        )
-    return found
+    originals.add_meshes(meshes)
+    originals.add_nested(meshes / "link0.stl")
+    originals.add_scenes(meshes / "link0.stl")
+    originals.add_keys()
+    return originals.found

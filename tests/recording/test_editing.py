@@ -37,6 +37,15 @@ def test_repair_restores_parts_beside_a_file_that_cannot_be_opened(small_recordi
         assert [e.facts["uid"] for e in dataset] == ["9"]
 
 
+def test_a_file_of_which_nothing_is_left_is_refused_in_words(small_recording):
+    small_recording.write_bytes(b"no HDF5")
+    with pytest.raises(
+        DatasetError, match=r"^Nothing can be read\. '.*' is not an HDF5"
+    ):
+        editing.repair(small_recording)
+    assert small_recording.read_bytes() == b"no HDF5"
+
+
 @pytest.mark.slow
 def test_merging_twice_changes_nothing(small_recording, tmp_path):
     other, merged = tmp_path / "other.hdf5", tmp_path / "merged.hdf5"

@@ -60,7 +60,7 @@ def repair(path: str | Path) -> list[Finding]:
                 names[finding.place] = free_name(episode.name, names.values())
         damaged = any(f.problem for f in findings)
         if not names and damaged:
-            raise DatasetError(f"Nothing of '{path}' can be read: {findings[0]}.")
+            raise DatasetError(f"Nothing can be read. {findings[0].problem}")
         if damaged or part_files(path):
             _write_repaired(path, names, keep_old=damaged)
         if not damaged or not part_files(path):
