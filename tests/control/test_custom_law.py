@@ -9,6 +9,7 @@ from wbc_suite.compiling import compiled
 from wbc_suite.control.law.custom import LAWS, law_kernel, law_kind, register_law
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law
+from wbc_suite.control.loop.kernels import bind_kernels
 from wbc_suite.control.loop.records import LawKind
 from wbc_suite.envs import Simulation
 from wbc_suite.errors import ConfigError
@@ -120,3 +121,19 @@ def test_joint_limits_hold_for_a_registered_law(alone):
         fastest = max(fastest, abs(float(state.data.qvel[swing.drives["dof"][0]])))
     velocity_max = float(swing.drives["velocity_max"][0])
     assert 0.9 * velocity_max < fastest < 1.02 * velocity_max
+
+
+def test_kernels_are_bound_again_only_where_laws_change(alone, monkeypatch):
+    robot, bound = alone("Panda", "BASIC"), []
+
+    def bind(laws, *arguments, **named):
+        bound.append(laws["kind"].tolist())
+        return bind_kernels(laws, *arguments, **named)
+
+    monkeypatch.setattr("wbc_suite.envs.simulation.bind_kernels", bind)
+    state = robot.state
+    simulation = Simulation(state.model, state.data, [(state, robot.controller)])
+    simulation.start()
+    for _ in range(3):
+        simulation.tick(5)
+    assert len(bound) == 1

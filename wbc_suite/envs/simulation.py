@@ -98,7 +98,7 @@ class Simulation:
             for c in ([] if exact else self._dynamic)
         ]
         self._believed = believed
-        self._runs_plain, self._needed = not compiled, b""
+        self._runs_plain, self._needed = not compiled, list[bytes]()
         self._physics: Any = bind_physics(model, believed)
         self._bodies: Any = tuple(solver.dynamics for solver in self._dynamic) or None
         self._records = self._laws, self._drives
@@ -219,7 +219,7 @@ class Simulation:
 
     def _bind_kernels(self) -> None:
         """Compile what the laws need, if that is not the same as before."""
-        needed = self._laws[[*DECIDING]].tobytes()
+        needed = [self._laws[name].tobytes() for name in DECIDING]
         if needed != self._needed:
             kernels, self._owner = bind_kernels(
                 self._laws,

@@ -119,26 +119,28 @@ def solve_warm(qp: QpArrays) -> bool:
     Return whether x is the optimum, provided that it keeps the rows.
     """
     n, m = qp.x.shape[0], qp.e.shape[0]
-    p, k = qp.counts[0], qp.counts[1]
+    counts, side, upper, wanted, last = qp.counts, qp.side, qp.upper, qp.wanted, qp.last
+    root, diagonal, mu, W, rows = qp.root, qp.diagonal, qp.mu[0], qp.W, qp.rows
+    p, k, system, y = counts[0], counts[1], qp.system, qp.y
     for i in range(n):
-        qp.root[i] = 1.0 / np.sqrt(qp.diagonal[0, i] + qp.mu[0])
+        root[i] = 1.0 / np.sqrt(diagonal[0, i] + mu)
     for row in range(m + p + k):
-        qp.last[row] = _end(qp.W[row] if row < m else qp.rows[row - m])
+        last[row] = _end(W[row] if row < m else rows[row - m])
     for row in range(p):
-        if qp.upper[n + row] >= UNBOUNDED and qp.wanted[row] >= UNBOUNDED:
-            qp.side[n + row] = 0
+        if upper[n + row] >= UNBOUNDED and wanted[row] >= UNBOUNDED:
+            side[n + row] = 0
     for count in range(_QUICK + _CAREFUL):
         if count == _QUICK:
-            qp.side[:] = 0
+            side[:] = 0
         size = _state_system(qp)
-        cholesky(qp.system, size, _DEPENDENT)
-        solve_lower(qp.system, qp.y, size)
-        solve_upper(qp.system, qp.y, size)
+        cholesky(system, size, _DEPENDENT)
+        solve_lower(system, y, size)
+        solve_upper(system, y, size)
         _recover(qp, size)
         changed = _deactivate(qp)
         if not _activate(qp, count >= _QUICK) and not changed:
             return True
-    qp.side[:] = 0
+    side[:] = 0
     return False
 
 
@@ -218,19 +220,20 @@ def _recover(qp: QpArrays, size: int) -> None:
 @inner
 def _deactivate(qp: QpArrays) -> bool:
     """Make inactive what has a multiplier of the wrong sign; return if there is any."""
-    n, changed = qp.x.shape[0], False
+    n, changed, side, multipliers = qp.x.shape[0], False, qp.side, qp.multipliers
+    lower, upper, wanted, weight = qp.lower, qp.upper, qp.wanted, qp.weight[0]
     for i in range(n):
-        wrong = qp.multipliers[i] * qp.side[i] < 0.0
-        if wrong and qp.lower[i] < qp.upper[i]:
-            qp.side[i], changed = 0, True
+        wrong = multipliers[i] * side[i] < 0.0
+        if wrong and lower[i] < upper[i]:
+            side[i], changed = 0, True
     for row in range(qp.counts[0]):
-        force, side = qp.multipliers[n + row], qp.side[n + row]
-        if side != 0 and force < 0.0:
-            qp.side[n + row], changed = 0, True
-        elif side == _HARD and qp.wanted[row] < qp.upper[n + row]:
-            slack = qp.upper[n + row] - qp.wanted[row]
-            if force < qp.weight[0] * slack:
-                qp.side[n + row], changed = _SOFT, True
+        force, state = multipliers[n + row], side[n + row]
+        if state != 0 and force < 0.0:
+            side[n + row], changed = 0, True
+        elif state == _HARD and wanted[row] < upper[n + row]:
+            slack = upper[n + row] - wanted[row]
+            if force < weight * slack:
+                side[n + row], changed = _SOFT, True
     return changed
 
 
@@ -241,31 +244,32 @@ def _activate(qp: QpArrays, only_one: bool) -> bool:  # noqa: C901, one search
     Clips what is violated by rounding.
     """
     n, found, worst, state = qp.x.shape[0], -1, 0.0, 0
+    x, side, lower, upper = qp.x, qp.side, qp.lower, qp.upper
+    wanted, rows = qp.wanted, qp.rows
     for i in range(n):
-        over, under = qp.x[i] - qp.upper[i], qp.lower[i] - qp.x[i]
+        over, under = x[i] - upper[i], lower[i] - x[i]
         violation = over if over > under else under
         if violation <= _TOLERANCE:  # False for what is not a number
-            qp.x[i] = min(max(qp.x[i], qp.lower[i]), qp.upper[i])
+            x[i] = min(max(x[i], lower[i]), upper[i])
             continue
-        side = 1 if over > under else -1
+        new = 1 if over > under else -1
         if not only_one:
-            qp.side[i] = side
+            side[i] = new
         if found < 0 or violation > worst:
-            found, worst, state = i, violation, side
+            found, worst, state = i, violation, new
     for row in range(qp.counts[0]):
-        if qp.side[n + row] == _HARD:
+        if side[n + row] == _HARD:
             continue
-        bound = qp.upper[n + row]
-        soft = qp.wanted[row] < bound and qp.side[n + row] == 0
-        value = dot(qp.rows[row], qp.x, n)
-        violation = value - (qp.wanted[row] if soft else bound)
+        bound = upper[n + row]
+        soft = wanted[row] < bound and side[n + row] == 0
+        violation = dot(rows[row], x, n) - (wanted[row] if soft else bound)
         if violation <= _ROW_TOLERANCE:
             continue
-        side = _SOFT if soft else _HARD
+        new = _SOFT if soft else _HARD
         if not only_one:
-            qp.side[n + row] = side
+            side[n + row] = new
         if found < 0 or violation > worst:
-            found, worst, state = n + row, violation, side
+            found, worst, state = n + row, violation, new
     if only_one and found >= 0:
-        qp.side[found] = state
+        side[found] = state
     return found >= 0

@@ -7,11 +7,11 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_count, check_number
-from wbc_suite.compiling import as_argument, compiled, inner, struct
+from wbc_suite.compiling import as_argument, inner, struct
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers
+from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers, write_rows
 from wbc_suite.qp.self_collision_rows import greatest_approach, insert_nearest
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -114,14 +114,14 @@ class FloorLimit(RowLimit):
     ) -> None:
         """Write the rows of the lowest spheres, `-J_z dq <= ...`."""
         compute_joint_poses(configuration.robot)
-        floor_rows(configuration.robot, self.argument, dt, G, h)
+        write_rows(floor_rows, configuration.robot, self.argument, dt, G, h)
 
     def subject(self, row: int) -> str:
         """Return the link of a row of the last tick."""
         return self._links[int(self.found[row])]
 
 
-@compiled
+@inner
 def floor_rows(
     robot: RobotArrays, spheres: SphereArrays, dt: float, G: Matrix, h: Vector
 ) -> None:

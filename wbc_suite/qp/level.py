@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc_suite.compiling import as_argument
+from wbc_suite.compiling import as_argument, by_address
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.qp.constraints import Constraints, with_rows
@@ -16,7 +16,7 @@ from wbc_suite.qp.limit import unlimited_bounds
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.strict_level import LevelArrays
 from wbc_suite.qp.task import JointTask, RowTask, Task
-from wbc_suite.qp.task_kernels import TaskArrays
+from wbc_suite.qp.task_kernels import TaskArrays, com_error, no_com
 from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 
@@ -202,8 +202,11 @@ def _task_arrays(
         if isinstance(task, FrameTask):
             joint[row], offset[row] = task.joint, task.offset
     joint_kernel = [_joint_kernel(task, q_index) for task in joints]
+    kernel = np.array([kernel_of(task) for task in rows], dtype=np.int64)
+    com, vector = com_error if Kernel.COM in kernel else no_com, np.zeros(1)
     return TaskArrays(
-        kernel=np.array([kernel_of(task) for task in rows], dtype=np.int64),
+        write_com=by_address(com, configuration.robot, vector, vector, np.eye(1)),
+        kernel=kernel,
         joint=joint,
         offset=offset,
         target=np.zeros((n, 12)),

@@ -8,9 +8,10 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc_suite.compiling import compiled, inner, struct
+from wbc_suite.compiling import by_address, compiled, inner, struct
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.configuration import named_joints
+from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.qp.kernel import Kernel
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -93,6 +94,20 @@ class RowLimit(ABC):
     def subject(self, row: int) -> object:
         """Return what a row of the last tick limits: a value that prints itself."""
         return f"{type(self).__name__}[{row}]"
+
+
+def write_rows(
+    kernel: Any, robot: RobotArrays, arrays: Any, dt: float, G: Matrix, h: Vector
+) -> None:
+    """Let a kernel write rows by its address, as in ticks: it is compiled once."""
+    _call(by_address(kernel, robot, arrays, dt, G, h), robot, arrays, dt, G, h)
+
+
+@compiled
+def _call(
+    kernel: Any, robot: RobotArrays, arrays: Any, dt: float, G: Matrix, h: Vector
+) -> None:
+    kernel(robot, arrays, dt, G, h)
 
 
 Limit: TypeAlias = BoxLimit | RowLimit

@@ -7,11 +7,11 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_count, check_number
-from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.compiling import as_argument, inner, struct
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers
+from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers, write_rows
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.qp.self_collision_limit import LinkPair
 from wbc_suite.qp.self_collision_rows import greatest_approach, speed_along
@@ -100,14 +100,14 @@ class ObstacleLimit(RowLimit):
     ) -> None:
         """Write the rows of the points, `-n . J_p dq <= ...`."""
         compute_joint_poses(configuration.robot)
-        obstacle_rows(configuration.robot, self.argument, dt, G, h)
+        write_rows(obstacle_rows, configuration.robot, self.argument, dt, G, h)
 
     def subject(self, row: int) -> LinkPair:
         """Return the link and the obstacle of a row of the last tick."""
         return self.pairs[int(self.arrays.found[row])]
 
 
-@compiled
+@inner
 def obstacle_rows(
     robot: RobotArrays, obstacles: ObstacleArrays, dt: float, G: Matrix, h: Vector
 ) -> None:

@@ -13,7 +13,7 @@ from wbc_suite.compiling import as_argument
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import compute_joint_poses
 from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers
+from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers, write_rows
 from wbc_suite.qp.self_collision_rows import CapsuleArrays, self_collision_rows
 from wbc_suite.robot.collision_capsules import (
     EnclosingCapsule,
@@ -119,7 +119,7 @@ class SelfCollisionLimit(RowLimit):
         arrays = self._make_arrays(configuration, count, self.margin)
         compute_joint_poses(robot)
         G, h = np.zeros((count, configuration.nv)), np.zeros(count)
-        self_collision_rows(robot, as_argument(arrays), 1.0, G, h)
+        write_rows(self_collision_rows, robot, as_argument(arrays), 1.0, G, h)
         touching = arrays.found[arrays.found >= 0]
         self._pairs = np.delete(self._pairs, touching, axis=0)
         self._model = None
@@ -170,8 +170,9 @@ class SelfCollisionLimit(RowLimit):
         self, configuration: Configuration, dt: float, G: Matrix, h: Vector
     ) -> None:
         """Write the dampers of the nearest pairs, `-n . (J_a - J_b) dq <= ...`."""
-        compute_joint_poses(configuration.robot)
-        self_collision_rows(configuration.robot, self.argument, dt, G, h)
+        robot = configuration.robot
+        compute_joint_poses(robot)
+        write_rows(self_collision_rows, robot, self.argument, dt, G, h)
 
     def reset(self) -> None:
         """Discard the list of near pairs."""

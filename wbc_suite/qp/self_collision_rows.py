@@ -42,7 +42,7 @@ class CapsuleArrays(NamedTuple):
     distance: Vector  # (k,), output: distance of each row's pair, inf for none
 
 
-@compiled
+@inner
 def self_collision_rows(
     robot: RobotArrays, capsules: CapsuleArrays, dt: float, G: Matrix, h: Vector
 ) -> None:

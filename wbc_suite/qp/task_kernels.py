@@ -4,6 +4,7 @@
 Those of built-in kinds are computed here; those of others are in the buffers before.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from wbc_suite.typing import Indices, Matrix, Vector
 class TaskArrays(NamedTuple):
     """The tasks of one level: n tasks with m rows in all, and k tasks on joints."""
 
+    write_com: Callable[..., None]  # `com_error`, or `no_com` without such tasks
     kernel: Indices  # (n,), `Kernel` of each task with rows
     joint: Indices  # (n,), parent joint of the frame of each
     offset: Matrix  # (n, 12), pose of the frame in its joint, by columns
@@ -68,22 +70,24 @@ def write_tasks(
     bound in place of a guess). Return whether all rows are finite.
     """
     compute_joint_poses(robot)
-    mu, total = damping, 0.0
-    for t in range(tasks.kernel.shape[0]):
-        rows = slice(tasks.row_start[t], tasks.row_start[t + 1])
-        support = tasks.support[tasks.support_start[t] : tasks.support_start[t + 1]]
-        error, jacobian = tasks.error[rows], tasks.jacobian[rows]
-        if tasks.kernel[t] == Kernel.FRAME:
-            joint, offset, target = tasks.joint[t], tasks.offset[t], tasks.target[t]
+    mu, total, diagonal, kernel = damping, 0.0, tasks.diagonal, tasks.kernel
+    targets, errors, jacobians = tasks.target, tasks.error, tasks.jacobian
+    row_start, starts, supports = tasks.row_start, tasks.support_start, tasks.support
+    for t in range(kernel.shape[0]):
+        rows = slice(row_start[t], row_start[t + 1])
+        support, target = supports[starts[t] : starts[t + 1]], targets[t]
+        error, jacobian = errors[rows], jacobians[rows]
+        if kernel[t] == Kernel.FRAME:
+            joint, offset = tasks.joint[t], tasks.offset[t]
             frame_error(robot, joint, offset, target, support, error, jacobian)
-        elif tasks.kernel[t] == Kernel.COM:
-            com_error(robot, tasks.target[t], error, jacobian)
+        elif kernel[t] == Kernel.COM:
+            tasks.write_com(robot, target, error, jacobian)
         bending, size = _weigh_rows(tasks, t, support, dt)
         mu += curvature * bending
         total += size
     _write_joint_tasks(robot, tasks, dt)
-    for i in range(tasks.diagonal.shape[1]):
-        total += abs(tasks.diagonal[0, i]) + abs(tasks.diagonal[1, i])
+    for i in range(diagonal.shape[1]):
+        total += abs(diagonal[0, i]) + abs(diagonal[1, i])
     tasks.mu[0] = mu
     return bool(np.isfinite(mu + total))
 
@@ -146,6 +150,11 @@ def relative_rotation(T: Vector, target: Vector, out: Matrix) -> bool:
     return finite
 
 
+@inner
+def no_com(robot: RobotArrays, target: Vector, error: Vector, jacobian: Matrix) -> None:
+    """Do nothing: no task of the level has a centre of mass."""
+
+
 @compiled
 def com_error(
     robot: RobotArrays, target: Vector, error: Vector, jacobian: Matrix
@@ -169,24 +178,25 @@ def _weigh_rows(
 
     Return `sum |e| max|W|` over the rows, and the sum of all sizes.
     """
-    first, last = tasks.row_start[t], tasks.row_start[t + 1]
+    row_start, errors, distances = tasks.row_start, tasks.error, tasks.distances
+    first, last, max_speed = row_start[t], row_start[t + 1], tasks.max_speed
     middle, finite, gain = tasks.angular_start[t], True, tasks.gain[t]
+    all_W, jacobian, costs, steps = tasks.W, tasks.jacobian, tasks.cost, tasks.e
     scale = np.empty(2)
     for part in range(2):
         square = 0.0
         for row in range(middle if part else first, last if part else middle):
-            square += tasks.error[row] ** 2
-        length, limit = np.sqrt(square), tasks.max_speed[t, part] * dt
-        tasks.distances[t, part] = length
+            square += errors[row] ** 2
+        length, limit = np.sqrt(square), max_speed[t, part] * dt
+        distances[t, part] = length
         finite &= length < FAR
         scale[part] = gain if gain * length <= limit else limit / length
     if not finite:
-        tasks.distances[t, 0] = tasks.distances[t, 1] = np.nan
+        distances[t, 0] = distances[t, 1] = np.nan
         tasks.all_finite[0] = 0.0
     bending, total = 0.0, 0.0
-    all_W, jacobian = tasks.W, tasks.jacobian
     for row in range(first, last):
-        cost, longest = tasks.cost[row], 0.0
+        cost, longest = costs[row], 0.0
         W, J = all_W[row], jacobian[row]
         for k in range(support.shape[0]):
             weighted = cost * J[support[k]]
@@ -196,8 +206,8 @@ def _weigh_rows(
             longest = max(longest, size)
         e = 0.0
         if finite:
-            e = cost * scale[0 if row < middle else 1] * tasks.error[row]
-        tasks.e[row] = e
+            e = cost * scale[0 if row < middle else 1] * errors[row]
+        steps[row] = e
         total += abs(e)
         bending += abs(e) * longest
     return bending, total

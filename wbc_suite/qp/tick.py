@@ -171,31 +171,38 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
     if start == 0 and not tick.prepared[0]:
         return TickStatus.NEEDS_PYTHON.value, 0
     tick.prepared[0] = tick.prepared[1]
-    levels, kernels = tick.levels, tick.kernels
-    for k in range(start, tick.level_count):
+    levels, kernels, count, x, v = (
+        tick.levels,
+        tick.kernels,
+        tick.level_count,
+        tick.x,
+        tick.v,
+    )
+    robot, curvature = tick.robot, tick.curvature
+    for k in range(start, count):
         level, damping = levels[k], tick.damping
         if k == 0:
             if not _begin_tick(tick, dt):
                 return TickStatus.BAD_POSITION.value, 0
             past, held = tick.overshoot, tick.held
             damping += tick.pressure_damping[0]
-            damping += damp_overshoot(past, levels, tick.level_count, held, tick.v, dt)
+            damping += damp_overshoot(past, levels, count, held, v, dt)
         else:
-            kernels.restrict(levels, k, tick.x)
+            kernels.restrict(levels, k, x)
             damping = levels[k - 1].tasks.mu[0]
-        robot, curvature = tick.robot, tick.curvature
-        if not kernels.write_tasks(robot, level.tasks, dt, damping, curvature):
+        tasks, qp = level.tasks, level.qp
+        if not kernels.write_tasks(robot, tasks, dt, damping, curvature):
             return TickStatus.BAD_ROWS.value, k
-        if k == 0 and level.qp.counts[0] > 0:  # the cost of soft rows
-            level.qp.weight[0] = RETURN_WEIGHT * stiffness(level.tasks)
-        if not tick.warm or not kernels.solve(level.qp) or not _is_feasible(tick, k):
+        if k == 0 and qp.counts[0] > 0:  # the cost of soft rows
+            qp.weight[0] = RETURN_WEIGHT * stiffness(tasks)
+        if not tick.warm or not kernels.solve(qp) or not _is_feasible(tick, k):
             return TickStatus.UNSOLVED.value, k
         finish_level(tick, k, dt, True)
-    for i in range(tick.x.shape[0]):
-        tick.v[i] = tick.x[i] / dt
+    for i in range(x.shape[0]):
+        v[i] = x[i] / dt
     if start > 0:
-        tick.residual[0] = _violation(tick.x, tick.levels[0].qp)
-    return TickStatus.SOLVED.value, tick.level_count
+        tick.residual[0] = _violation(x, levels[0].qp)
+    return TickStatus.SOLVED.value, count
 
 
 @compiled
@@ -204,14 +211,13 @@ def finish_level(tick: TickArrays, k: int, dt: float, kept: bool) -> None:
 
     `kept` is whether its rows were; those that are relaxed do not damp the next tick.
     """
-    qp = tick.levels[k].qp
+    qp, damping = tick.levels[k].qp, tick.pressure_damping
     tick.solved[0] = k + 1
     copy_vector(qp.x, tick.x)
     if k == 0 and qp.rows.shape[0] > 0:
-        tick.pressure_damping[0] *= np.exp(-dt / _PRESSURE_MEMORY)
+        damping[0] *= np.exp(-dt / _PRESSURE_MEMORY)
         if kept:
-            pressure = tick.curvature * _row_pressure(qp)
-            tick.pressure_damping[0] = max(tick.pressure_damping[0], pressure)
+            damping[0] = max(damping[0], tick.curvature * _row_pressure(qp))
 
 
 @compiled_inline
@@ -219,13 +225,14 @@ def _begin_tick(tick: TickArrays, dt: float) -> bool:
     """Write bounds and limit rows; return whether the configuration is finite."""
     robot, qp, total = tick.robot, tick.levels[0].qp, 0.0
     tick.solved[0], tick.all_finite[0] = 0, 1.0
-    for i in range(robot.q.shape[0]):
-        total += robot.q[i]
+    q, upper = robot.q, qp.upper
+    for i in range(q.shape[0]):
+        total += q[i]
     if not np.isfinite(total):
         return False
     nv = tick.x.shape[0]
-    lower, upper = qp.lower[:nv], qp.upper[:nv]
-    merge_bounds(tick.bounds, robot.q, tick.v, dt, lower, upper, tick.kinds)
+    lower, upper = qp.lower[:nv], upper[:nv]
+    merge_bounds(tick.bounds, q, tick.v, dt, lower, upper, tick.kinds)
     if qp.rows.shape[0] > 0:
         compute_joint_poses(robot)
         _write_rows(tick, qp, dt)
@@ -241,34 +248,38 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     robot that stands is never asked to move. Far outside it may be relaxed further,
     see `RowLimit.relax_speed`.
     """
-    p, k, nv = qp.counts[0], qp.counts[1], tick.x.shape[0]
-    robot, h = tick.robot, qp.upper[nv : nv + p]
+    counts, nv, upper, lower = qp.counts, tick.x.shape[0], qp.upper, qp.lower
+    p, k, relax_speed, rate = counts[0], counts[1], tick.relax_speed, tick.rate
+    robot, h, soft = tick.robot, upper[nv : nv + p], qp.wanted
     kernels, G = tick.kernels, qp.rows
-    first, last = tick.collision_rows[0], tick.collision_rows[1]
+    place = tick.collision_rows
+    first, last = place[0], place[1]
     kernels.collision(robot, tick.capsules, dt, G[first:last], h[first:last])
-    first, last = tick.floor_rows[0], tick.floor_rows[1]
+    place = tick.floor_rows
+    first, last = place[0], place[1]
     kernels.floor(robot, tick.spheres, dt, G[first:last], h[first:last])
-    first, last = tick.obstacle_rows[0], tick.obstacle_rows[1]
+    place = tick.obstacle_rows
+    first, last = place[0], place[1]
     kernels.obstacles(robot, tick.obstacles, dt, G[first:last], h[first:last])
     for row in range(p):
         wanted = h[row]
-        h[row] = max(wanted, 0.0, -2.0 * (wanted + tick.relax_speed[row] * dt))
-        qp.wanted[row] = min(wanted, UNBOUNDED)
-    b = qp.upper[nv + p :]
+        h[row] = max(wanted, 0.0, -2.0 * (wanted + relax_speed[row] * dt))
+        soft[row] = min(wanted, UNBOUNDED)
+    b = upper[nv + p :]
     for row in range(k):
-        if np.isfinite(tick.rate[row]):
-            b[row] = tick.rate[row] * dt
+        if np.isfinite(rate[row]):
+            b[row] = rate[row] * dt
     kernels.hold(robot, tick.held, dt, G[p:], b)
     for row in range(k):
-        qp.lower[nv + p + row] = b[row]
+        lower[nv + p + row] = b[row]
 
 
 @compiled
 def stiffness(tasks: TaskArrays) -> float:
     """Return the largest entry of H without damping, or 1."""
-    stiffest, W = 1.0, tasks.W
-    for i in range(tasks.diagonal.shape[1]):
-        total = tasks.diagonal[0, i]
+    stiffest, W, diagonal = 1.0, tasks.W, tasks.diagonal
+    for i in range(diagonal.shape[1]):
+        total = diagonal[0, i]
         for row in range(W.shape[0]):
             total += W[row, i] ** 2
         stiffest = max(stiffest, total)
@@ -285,16 +296,17 @@ def _row_pressure(qp: QpArrays) -> float:
     with is the most.
     """
     n, greatest, total = qp.x.shape[0], 0.0, 0.0
-    rows, W, e = qp.rows, qp.W, qp.e
-    for row in range(qp.counts[0] + qp.counts[1]):
-        if qp.multipliers[n + row] != 0.0:
+    rows, W, e, counts, multipliers = qp.rows, qp.W, qp.e, qp.counts, qp.multipliers
+    diagonal = qp.diagonal
+    for row in range(counts[0] + counts[1]):
+        if multipliers[n + row] != 0.0:
             longest = 0.0
             for i in range(n):
                 longest = max(longest, abs(rows[row, i]))
-            total += abs(qp.multipliers[n + row]) * longest
+            total += abs(multipliers[n + row]) * longest
     if total > 0.0:
         for i in range(n):
-            pull = qp.diagonal[1, i]
+            pull = diagonal[1, i]
             for row in range(e.shape[0]):
                 pull += W[row, i] * e[row]
             greatest += _PRESSURE_MAX * abs(pull)
@@ -304,7 +316,8 @@ def _row_pressure(qp: QpArrays) -> float:
 @inner
 def _violation(x: Vector, qp: QpArrays) -> float:
     """Return by how much x violates the bounds and rows of a problem."""
-    size = qp.counts[0] + qp.counts[1]
+    counts = qp.counts
+    size = counts[0] + counts[1]
     if size == 0:  # bounds are kept by clipping
         return 0.0
     end = x.shape[0] + size
@@ -317,8 +330,10 @@ def _is_feasible(tick: TickArrays, k: int) -> bool:
 
     Rows longer than 1 are more sensitive than their orthonormal basis.
     """
-    x, own = tick.levels[k].qp.x, 0.0
+    levels, own = tick.levels, 0.0
+    qp = levels[k].qp
     if k > 0:
-        own = _violation(x, tick.levels[k].qp)
-    tick.residual[0] = _violation(x, tick.levels[0].qp)
-    return own <= TOLERANCE and tick.residual[0] <= TOLERANCE
+        own = _violation(qp.x, qp)
+    first = _violation(qp.x, levels[0].qp)
+    tick.residual[0] = first
+    return own <= TOLERANCE and first <= TOLERANCE
