@@ -34,4 +34,4 @@ def test_long_hands_start_clear_of_the_pot(robot):
     env = wbc_suite.make("TwoArmLift", robots=[robot, robot])
     for seed in range(20):
         env.reset(seed=seed)  # else a PlacementError
-        assert not any(map(env.benchmark.grasped, env.benchmark.states))
+        assert not any(map(env.benchmark.scene.grasped, env.benchmark.states))
