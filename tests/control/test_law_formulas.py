@@ -28,6 +28,8 @@ from wbc_suite.control.dynamics import solve_tick, terms
 from wbc_suite.control.law import osc
 from wbc_suite.control.law.pose_interpolation import interpolate_pose, pose_vector
 from wbc_suite.control.loop import acceleration_limits as limits
+from wbc_suite.control.loop import inverse_dynamics
+from wbc_suite.control.loop.records import LAW, LawKind
 from wbc_suite.control.part.joint_controllers import JointPositionController
 from wbc_suite.control.part.osc_controller import OscConfig
 
@@ -259,15 +261,11 @@ class TestProgress:
             trail[TRAIL]
 
 
-@pytest.mark.parametrize("flag", [0.0, 1.0])
-def test_osc_keeps_the_direction_of_the_hand_where_it_is_asked_to(flag, monkeypatch):
-    """And limits accelerations in any case, last."""
-    called, n = [], 7
+def test_osc_adds_the_way_to_its_goal_to_what_its_posture_asks_for(monkeypatch):
+    n = 7
     for name in ("write_hand_task", "solve_lower", "lq_solve", "solve_upper"):
         monkeypatch.setattr(osc, name, lambda *_: None)
     monkeypatch.setattr(osc, "_write_damped_factors", lambda *_: None)
-    for name in ("keep_direction", "limit_accelerations"):
-        monkeypatch.setattr(osc, name, lambda *_, name=name: called.append(name))
     work = record(
         J=np.zeros((6, n)),
         C=np.eye(n),
@@ -280,9 +278,38 @@ def test_osc_keeps_the_direction_of_the_hand_where_it_is_asked_to(flag, monkeypa
         dofs=np.arange(n)[::-1],
     )
     physics = record(osc=work, acceleration=np.zeros(n))
-    plain(osc.osc_law)(physics, record(first=0, last=n, keep_direction=flag), None)
-    assert called == ["keep_direction"] * bool(flag) + ["limit_accelerations"]
+    plain(osc.osc_law)(physics, record(first=0, last=n), None)
     np.testing.assert_array_equal(physics.acceleration[::-1], np.arange(7.0) + 2.0)
+
+
+@pytest.mark.parametrize("asked", [0.0, 1.0])
+@pytest.mark.parametrize("saturated", [False, True])
+def test_hands_come_last_and_keep_their_direction_where_they_are_asked_to(
+    asked, saturated, monkeypatch
+):
+    """And accelerations are limited in any case, last."""
+    called = []
+
+    def note(*words):
+        return lambda *_: called.append(" ".join(words))
+
+    monkeypatch.setattr(inverse_dynamics, "is_saturated", lambda *_: saturated)
+    monkeypatch.setattr(inverse_dynamics, "limit_accelerations", note("limit"))
+    laws = np.zeros(3, LAW).view(np.recarray)
+    laws.kind = LawKind.OSC, LawKind.JOINT, LawKind.TORQUE
+    laws.kernel, laws.keep_direction = (1, 2, 0), (asked, 0.0, 0.0)
+    kernels = record(
+        observe=note("observe"),
+        law=(note("none"), note("hand"), note("joints")),
+        prepare=note("prepare"),
+        keep_direction=note("direction"),
+    )
+    physics = record(acceleration=np.ones(2), timestep=0.002)
+    plain(inverse_dynamics.ask_accelerations)(physics, laws, None, kernels, None)
+    kept = ["prepare", "direction"] * (saturated and asked > 0.0)
+    assert called == ["observe", "joints", "limit", "hand", *kept, "limit"]
+    np.testing.assert_array_equal(laws.since, 0.002)
+    assert not physics.acceleration.any()
 
 
 def test_the_commanded_scene_has_the_commanded_joints_and_the_measured_rest(

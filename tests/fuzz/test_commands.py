@@ -34,7 +34,6 @@ USAGE = [  # typer's own words: a usage line and a box
     "teleop --rate nan",
     "teleop --rate 300",
     "teleop --seed a",
-    "doctor x",
     "--nope",
 ]
 WORDS = [  # ours: one line
@@ -55,6 +54,7 @@ WORDS = [  # ours: one line
     "teleop Lift --controller nope",
     "teleop Lift --controller nope.toml",
     "describe-action nope",
+    "doctor x",
     "describe-action Panda --controller x",
 ]
 
