@@ -143,7 +143,7 @@ def read_lerobot(path):
         "lengths": lengths,
         "actions": actions,
         "pictures": pictures,
-        "environment": dataset.meta.tasks.index[0],
+        "tasks": list(dataset.meta.tasks.index),
         "means": [float(mean) for mean in stats],
     }
 
