@@ -52,7 +52,8 @@ HEADSET = ("--device", "headset", "--device-option", "port=0")
 OPEN = ("--host", "0.0.0.0")
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(wbc_suite.__file__).parents[1])}
 WATCH = """
-import time, wbc_suite
+import signal, time, wbc_suite
+signal.signal(signal.SIGINT, signal.default_int_handler)  # where it is ignored
 env = wbc_suite.make("Lift", robots="Panda", render_mode="human")
 env.reset(seed=0)
 print("Press Ctrl-C", flush=True)
