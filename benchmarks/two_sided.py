@@ -333,8 +333,7 @@ def main() -> None:
     for name in names:
         kinds = given.robots or (TWO if name.startswith("TwoArm") else ONE)
         for robots in kinds:
-            begun, search = time.process_time(), Search(name, robots, given.seed)
-            begun = time.process_time()
+            search, begun = Search(name, robots, given.seed), time.process_time()
             with progress(f"{name} {robots}", tries // len(kinds)) as advance:
                 for _ in range(tries // len(kinds)):
                     search.attempt()
