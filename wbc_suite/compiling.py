@@ -64,7 +64,7 @@ def compiled(function: Function, *, kept: bool = True, **options: Any) -> Functi
 compiled_nogil = partial(compiled, nogil=True)
 compiled_inline = partial(compiled, inline="always")
 
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 
 
 def inner(function: Function) -> Function:

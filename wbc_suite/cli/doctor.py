@@ -49,8 +49,10 @@ def doctor(
 
     The exit code is 1 if a required component is broken.
     """
-    if robots or compiles:
-        compile_kernels(robots or [], controller, compiles=compiles)
+    if compiles != bool(robots):
+        raise ConfigError("doctor: give --compile and robots, such as --compile Panda.")
+    if robots:
+        compile_kernels(robots, controller)
         return
     broken = 0
     if as_json:
@@ -68,17 +70,13 @@ def doctor(
     print("All required components work.")
 
 
-def compile_kernels(
-    robots: Sequence[str], controller: str | None, *, compiles: bool
-) -> None:
+def compile_kernels(robots: Sequence[str], controller: str | None) -> None:
     """Make one step of each robot, so that its machine code is in the cache."""
     import numpy as np
 
     from wbc_suite.envs import make
     from wbc_suite.kernel_cache import cache_folder
 
-    if not robots or not compiles:
-        raise ConfigError("doctor: give --compile and robots, such as --compile Panda.")
     for robot in robots:
         start = time.monotonic()
         env = make("Lift", robots=robot, controller_configs=controller)
