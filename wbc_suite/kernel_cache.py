@@ -1,4 +1,4 @@
-"""The folder where numba keeps machine code: chosen, locked, checked and cleaned.
+"""The folder where numba keeps machine code: chosen, checked and cleaned.
 
 numba reads these files without a check: a damaged one would end every start, and one of
 another user could hold anything. So files are checked when they are new or changed, and
@@ -6,7 +6,6 @@ folders are private.
 """
 
 import atexit
-import fcntl
 import hashlib
 import io
 import json
@@ -15,31 +14,26 @@ import pickletools
 import shutil
 import stat
 import tempfile
-import threading
 import time
 import zlib
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numba
-from numba.core import event
 from numba.core.caching import UserProvidedCacheLocator
 
 from wbc_suite.catalogue import temporary_root, user_cache
 
 _untyped: Any = numba
-_event: Any = event
 
 PACKAGE = Path(__file__).parent
 
 KEPT = 7 * 24 * 3600.0  # s; code that no process asks for in this time is deleted
 TORN = 3600.0  # s; a file that is still being written after this was abandoned
 ROOM = 1 << 16  # bytes that must fit on the disk
-LOOK = 0.05  # s between two looks whether another process compiles
-LONGEST = 120.0  # s that a process waits for another one, which may be stopped
 CHECKED = "checked.json"
 """Size, time of change and CRC-32 of each file, by name, when it was checked."""
 KERNELS = b"wbc_suite.compiling" + b" import"  # in two, for this file has no kernels
@@ -224,56 +218,3 @@ def _kernels_digest() -> str:
         if KERNELS in source or file.name == "compiling.py":
             digest.update(source)
     return digest.hexdigest()[:16]
-
-
-class _OneProcess(_event.Listener):
-    """Lets one process at a time compile, so that others read what it has compiled.
-
-    A process that had to compile a kernel is alone from its next kernel on: from
-    before numba looks for its machine code until that is written. So processes that
-    start at once each compile the first kernel that is missing, and share the others.
-    """
-
-    def __init__(self) -> None:
-        self._guard, self._depth, self._compiles = threading.Lock(), 0, False
-        self._lock: IO[bytes] | None = None
-
-    def on_start(self, event: Any) -> None:
-        """Wait for another process that compiles."""
-        with self._guard:
-            if event.kind == "numba:compile":
-                self._compiles = True
-            else:
-                if self._depth == 0 and self._compiles:
-                    self._lock = _alone(cache_folder() / "lock")
-                self._depth += 1
-
-    def on_end(self, event: Any) -> None:
-        """Let other processes go on."""
-        if event.kind == "numba:compile":
-            return
-        with self._guard:
-            self._depth -= 1
-            if self._depth == 0 and self._lock is not None:
-                self._lock.close()
-                self._lock = None
-
-
-def _alone(path: Path) -> IO[bytes] | None:
-    """Lock a file that no other process has locked; return None after `LONGEST`."""
-    with suppress(OSError):  # of file systems without locks
-        file = path.open("wb")
-        for _ in range(round(LONGEST / LOOK)):
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                time.sleep(LOOK)
-            else:
-                return file
-        file.close()
-    return None
-
-
-_ONE_PROCESS = _OneProcess()
-for _kind in ("numba:compiler_lock", "numba:compile"):
-    _event.register(_kind, _ONE_PROCESS)
