@@ -41,6 +41,7 @@ ORDER = (
 TOP = (
     "executors",
     "randomisation",
+    "web",
     "devices",
     "recording",
     "wrappers",

@@ -11,7 +11,6 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite.utils.binding_utils import MjSim
 from wbc_suite.compat.robosuite.utils.mjcf_utils import parse_file
 from wbc_suite.control import load_composite_controller_config
-from wbc_suite.devices.certificate import fingerprint, server_context
 from wbc_suite.errors import ConfigError, DatasetError, WbcError
 from wbc_suite.executors.results import ResultFolder, WorkItem
 from wbc_suite.files import check_file, open_file, read_bytes, read_text
@@ -20,6 +19,7 @@ from wbc_suite.robot import load_robot
 from wbc_suite.robot.mesh_files import read_points, skin_triangles
 from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.shapes import SkinMesh
+from wbc_suite.web.certificate import fingerprint, server_context
 
 READERS = {
     "robot.toml": load_robot,

@@ -239,14 +239,29 @@ class _Progress(event.Listener):
 
     def on_end(self, event: Any) -> None:
         """Count a kernel, and say so from time to time."""
-        self.depth -= 1
         self.count += 1
-        spent = self.spent + time.monotonic() - self.start
-        if spent > max(PATIENCE, self.said + INTERVAL):
-            self.said = spent
-            log.warning(PROGRESS, self.count, spent)
+        seconds = self.seconds()
+        if seconds > max(PATIENCE, self.said + INTERVAL):
+            self.said = seconds
+            log.warning(self.text())
+        self.depth -= 1
         if self.depth == 0:
-            self.spent = spent
+            self.spent = seconds
+
+    def seconds(self) -> float:
+        """Return the wall time in which kernels were compiled, s."""
+        now = time.monotonic() - self.start if self.depth else 0.0
+        return self.spent + now
+
+    def text(self) -> str:
+        """Return what is logged; nothing before the first kernel."""
+        return PROGRESS % (self.count, self.seconds()) if self.count else ""
 
 
-event.register("numba:compile", _Progress())
+_PROGRESS = _Progress()
+event.register("numba:compile", _PROGRESS)
+
+
+def progress_text() -> str:
+    """Return how many kernels this process has compiled; nothing if it is none."""
+    return _PROGRESS.text()

@@ -288,9 +288,9 @@ def test_a_camera_is_shown_on_the_page(lift, browser):
 
 def test_the_pages_process_stays_small(lift, browser):
     session, _ = lift
-    page = PageProcess(session, "127.0.0.1", 0, label="Panda · Lift")
+    page = PageProcess("127.0.0.1", 0, label="Panda · Lift")
     try:
-        page.wait()
+        page.attach(session)
         context = browser.new_context()
         context.set_default_timeout(300e3)
         tab = context.new_page()

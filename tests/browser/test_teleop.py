@@ -320,9 +320,9 @@ def test_page_for_others_asks_for_its_token(context):
 
 def test_page_of_another_process_shows_and_pauses_the_session(settled, context):
     session, _ = settled
-    page = PageProcess(session, "127.0.0.1", 0, label="Panda · Lift")
+    page = PageProcess("127.0.0.1", 0, label="Panda · Lift")
     try:
-        page.wait()
+        page.attach(session)
         tab = context.new_page()
         tab.goto(page.url)
         tab.get_by_text("input to joint target").wait_for()

@@ -19,9 +19,11 @@ def started(*arguments):
         text=True,
     )
     assert process.stdout is not None
+    url = ""
     for line in process.stdout:
-        if found := re.search(r"http://\S+", line):
-            return process, found[0]
+        url = found[0] if (found := re.search(r"http://\S+", line)) else url
+        if "Press Ctrl-C" in line:
+            return process, url
     raise AssertionError(f"no address was printed, exit code {process.wait()}")
 
 

@@ -132,8 +132,8 @@ def test_ten_thousand_messages_stop_neither_the_loop_nor_a_viewer(kind):
         device=device,
         pipeline=stages_of(kind, scale=1.0, mirror=False),
     )
-    page = PageProcess(session, "127.0.0.1", 0, label="test")
-    page.wait()
+    page = PageProcess("127.0.0.1", 0, label="test")
+    page.attach(session)
     device.start()
     session.start()
     options = {"subprotocols": [Subprotocol(f"viser-v{viser.__version__}")]}

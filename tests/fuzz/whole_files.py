@@ -8,13 +8,13 @@ from PIL import Image
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.devices.certificate import make_certificate
 from wbc_suite.envs.states import write_scene
 from wbc_suite.evaluation import make_policy
 from wbc_suite.recording import converting
 from wbc_suite.robot import load_robot
 from wbc_suite.robot.mesh_files import write_stl
 from wbc_suite.robot.triangle_meshes import box_mesh
+from wbc_suite.web.certificate import make_certificate
 from wbc_suite.wrappers import DataCollection
 
 LAYOUTS = ["robomimic", "npz", "minari", *(["mcap"] if find_spec("mcap") else [])]

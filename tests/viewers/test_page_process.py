@@ -64,8 +64,8 @@ def session():
 
 @pytest.fixture
 def page(session):
-    made = PageProcess(session, "127.0.0.1", 0, label="test")
-    made.wait()
+    made = PageProcess("127.0.0.1", 0, label="test")
+    made.attach(session)
     yield made
     made.stop()
     assert pages() == []
@@ -195,8 +195,8 @@ def test_page_outlives_a_hundred_visits_and_a_flood(session, page):
 
 @pytest.mark.slow
 def test_page_that_is_killed_lets_go_ends_the_session_and_is_reported(session):
-    page = PageProcess(session, "127.0.0.1", 0, label="test")
-    page.wait()
+    page = PageProcess("127.0.0.1", 0, label="test")
+    page.attach(session)
     Person(page).grab(session)
     (process,) = pages()
     os.kill(process.pid, signal.SIGKILL)
@@ -213,20 +213,22 @@ def test_taken_port_is_reported_where_the_page_was_asked_for(session):
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        page = PageProcess(session, "127.0.0.1", port, label="test")
+        page = PageProcess("127.0.0.1", port, label="test")
         with pytest.raises(DeviceError, match=str(port)):
-            page.wait()
+            page.attach(session)
         page.stop()
 
 
 def test_remote_session_asks_for_what_the_session_does_and_stands_a_loss(session):
     ours, theirs = multiprocessing.Pipe()
-    asked = []
+    asked, shown = [], []
 
     def answer():
-        for _ in range(10):
+        for k in range(12):
             asked.append(ours.recv())
             match asked[-1][0]:
+                case "progress":
+                    ours.send("Compiling kernels" if k == 0 else None)
                 case "info" | "snapshot" as name:
                     ours.send(getattr(session, name))
                 case "grab":
@@ -236,6 +238,8 @@ def test_remote_session_asks_for_what_the_session_does_and_stands_a_loss(session
     thread = threading.Thread(target=answer)
     thread.start()
     remote, here = RemoteSession(theirs), pin.SE3.Identity()
+    remote.wait(shown.append)
+    assert shown == ["Compiling kernels"]
     assert remote.grab(HAND, 3, here)
     remote.release(HAND, 3)
     remote.leave(3)
@@ -247,10 +251,20 @@ def test_remote_session_asks_for_what_the_session_does_and_stands_a_loss(session
     thread.join()
     names = [name for name, _ in asked]
     assert names == [
-        *("info", "snapshot", "grab", "release", "leave", "enable", "set_gripper"),
+        *(
+            "progress",
+            "progress",
+            "info",
+            "snapshot",
+            "grab",
+            "release",
+            "leave",
+            "enable",
+            "set_gripper",
+        ),
         *("pause", "reset", "command_episode"),
     ]
-    assert asked[6][1] == ("right_gripper", 1, 0.5)
+    assert asked[8][1] == ("right_gripper", 1, 0.5)
     assert remote.info.limbs.keys() == session.info.limbs.keys()
     assert not remote.lost.is_set()
     remote.drag(HAND, 3, here)

@@ -18,10 +18,10 @@ from websockets.sync.server import unix_serve
 from websockets.typing import Subprotocol
 
 from tests.listening import listening
-from wbc_suite.devices.web_server import WebServer
 from wbc_suite.errors import DeviceError
 from wbc_suite.viewers import private_viser
 from wbc_suite.viewers.page_server import PageServer, proxy
+from wbc_suite.web.server import WebServer
 
 PATIENCE = 60.0  # s, for a busy machine
 BIG = b"x" * 5_000_000  # a robot's meshes take a few million bytes

@@ -237,10 +237,10 @@ def test_page_in_its_own_process_drives_and_its_end_stops_the_robot():
     )
     session = TeleopSession(env, period=1.0 / RATE)
     session.tick()  # the loop is compiled
-    page = PageProcess(session, "127.0.0.1", 0, label="Spot")
+    page = PageProcess("127.0.0.1", 0, label="Spot")
     session.start()
     try:
-        page.wait()
+        page.attach(session)
         address = page.url.replace("http", "ws").rstrip("/") + SOCKET
         with connect(address) as socket:
 

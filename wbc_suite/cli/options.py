@@ -276,12 +276,16 @@ def tracked(items: Sequence[T], title: str) -> Iterator[T]:
             advance(1)
 
 
-def serve_until_interrupted(
-    site: "PageServer | PageProcess", title: str, until: threading.Event | None = None
-) -> None:
-    """Print the address of a page, and wait for `until`, or for ever."""
-    print(f"{title}\n\n    {site.url}\n", flush=True)
+def print_address(site: "PageServer | PageProcess") -> None:
+    """Print the address of a page."""
+    print(f"\n    {site.url}\n", flush=True)
     if site.token is not None:
         print("Anyone who has this address can use the page.", flush=True)
+
+
+def serve_until_interrupted(site: "PageServer", title: str) -> None:
+    """Print the address of a page, and wait for ever."""
+    print(title)
+    print_address(site)
     print("Press Ctrl-C to stop.", flush=True)
-    (until or threading.Event()).wait()
+    threading.Event().wait()

@@ -1,6 +1,7 @@
 """`wbc-suite record`: demonstrations into a file."""
 
 import sys
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,8 @@ from wbc_suite.cli.teleop import (
     default_controller,
     device_maker,
     drive,
+    page_title,
+    served_page,
     stages_of,
 )
 
@@ -145,7 +148,7 @@ def record(
         **common,
         device=device_maker(device, device_option),
         next_obs=next_obs,
-        names=(" and ".join(named), benchmark),
+        robots=named,
         rate=rate,
         seed=seed,
         address=(host, port) if page else None,
@@ -205,7 +208,9 @@ def _record_by_hand(
     plan: "RecordingPlan",
     *,
     benchmark: str,
+    robots: Sequence[str],
     arguments: dict[str, Any],
+    address: tuple[str, int | None] | None,
     device: "Callable[[Any], Any]",
     next_obs: bool,
     seed: int,
@@ -216,18 +221,21 @@ def _record_by_hand(
     from wbc_suite.recording.episode_control import EpisodeControl
     from wbc_suite.wrappers import DataCollection
 
-    env = wbc_suite.make(benchmark, **arguments)
-    collected = DataCollection(env, out, automatic=False, next_obs=next_obs)
-    with closing(collected):
-        drive(
-            collected,
-            seed=seed,
-            device=device(env),
-            episode_control=EpisodeControl(
-                collected.recorder, seed=seed, plan=plan, report=_print_message
-            ),
-            **driving,
-        )
+    with served_page(address, robots, benchmark) as page:
+        env = wbc_suite.make(benchmark, **arguments)
+        collected = DataCollection(env, out, automatic=False, next_obs=next_obs)
+        with closing(collected):
+            drive(
+                collected,
+                page,
+                title=page_title(robots, benchmark),
+                seed=seed,
+                device=device(env),
+                episode_control=EpisodeControl(
+                    collected.recorder, seed=seed, plan=plan, report=_print_message
+                ),
+                **driving,
+            )
     print(f"{out}: {collected.recorder.kept} episodes.")
 
 

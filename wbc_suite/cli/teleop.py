@@ -1,7 +1,8 @@
 """`wbc-suite teleop`, and what `record` shares with it: device, page, session."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,8 +22,8 @@ from wbc_suite.cli.options import (
     check_names,
     chosen,
     device_options,
+    print_address,
     robot_names,
-    serve_until_interrupted,
 )
 from wbc_suite.cli.output import print
 
@@ -31,9 +32,10 @@ if TYPE_CHECKING:
 
     from wbc_suite.devices import Device, PipelineConfig
     from wbc_suite.recording.episode_control import EpisodeControl
+    from wbc_suite.viewers.page_process import PageProcess
 
 ONE_DAY = 86_400  # s; horizon of a session, in place of the benchmark's
-POLL_PERIOD = 0.2  # s; of a session without a page
+POLL_PERIOD = 0.2  # s
 DRIVING = ("keyboard", "gamepad", "dualsense")
 """Devices whose keys and sticks drive robots that walk, at first."""
 DeviceMaker = Callable[["gymnasium.Env[Any, Any]"], "Device"]
@@ -108,38 +110,62 @@ def teleop(
         base=base,
     )
     pairs = [*(device_option or []), *tls_options(tls_cert, tls_key)]
-    make = None if device is None else device_maker(device, pairs)
-    stages = stages_of(device, scale=scale, mirror=mirror)
-    label = " and ".join(names)
-    print(f"Building {benchmark} with {label} ...", flush=True)
-    env: gymnasium.Env[Any, Any] = wbc_suite.make(
-        benchmark,
-        robots=names,
-        controller_configs=controller or default_controller(*names),
-        gripper_types=chosen(gripper),
-        base_types=base,
-        control_freq=rate,
-        horizon=round(ONE_DAY * rate),
-        skin=skin,
-    )
-    episode_control = None
-    chosen_device = None if make is None else make(env)
-    if record is not None:
-        env = collection = DataCollection(env, record, automatic=False)
-        episode_control = EpisodeControl(collection.recorder, seed=seed)
-    try:
-        drive(
-            env,
-            names=(label, benchmark),
-            rate=rate,
-            seed=seed,
-            address=(host, port),
-            device=chosen_device,
-            stages=stages,
-            episode_control=episode_control,
+    with served_page((host, port), names, benchmark) as page:
+        make = None if device is None else device_maker(device, pairs)
+        arguments = {"robots": names, "gripper_types": chosen(gripper)}
+        arguments |= {"base_types": base, "skin": skin, "control_freq": rate}
+        arguments |= {"horizon": round(ONE_DAY * rate)}
+        arguments |= {"controller_configs": controller or default_controller(*names)}
+        if page is not None:
+            page.check()
+        env: gymnasium.Env[Any, Any] = wbc_suite.make(benchmark, **arguments)
+        episode_control = None
+        chosen_device = None if make is None else make(env)
+        if record is not None:
+            env = collection = DataCollection(env, record, automatic=False)
+            episode_control = EpisodeControl(collection.recorder, seed=seed)
+        with closing(env):
+            drive(
+                env,
+                page,
+                title=page_title(names, benchmark),
+                rate=rate,
+                seed=seed,
+                device=chosen_device,
+                stages=stages_of(device, scale=scale, mirror=mirror),
+                episode_control=episode_control,
+            )
+
+
+def page_title(robots: Sequence[str], benchmark: str) -> str:
+    """Return the title of a page."""
+    return f"{' and '.join(robots)} · {benchmark}"
+
+
+@contextmanager
+def served_page(
+    address: tuple[str, int | None] | None, robots: Sequence[str], benchmark: str
+) -> Iterator["PageProcess | None"]:
+    """Serve a page, or none, which shows the first robot until `drive` takes over.
+
+    Args:
+        address: Host and port; None for no page.
+        robots: Names or files.
+        benchmark: For the title.
+    """
+    from wbc_suite.viewers.page_process import PageProcess
+
+    page, title = None, page_title(robots, benchmark)
+    print(f"{title}: getting ready ...", flush=True)
+    if address is not None:
+        page = PageProcess(
+            *address, label=title, robot=robots[0], on_open=print_address
         )
+    try:
+        yield page
     finally:
-        env.close()
+        if page is not None:
+            page.stop()
 
 
 def default_controller(*robots: str) -> str:
@@ -188,11 +214,11 @@ def stages_of(device: str | None, *, scale: float, mirror: bool) -> "PipelineCon
 
 def drive(
     env: "gymnasium.Env[Any, Any]",
+    page: "PageProcess | None",
     *,
-    names: tuple[str, str],
+    title: str,
     rate: float,
     seed: int,
-    address: tuple[str, int | None] | None,
     device: "Device | None",
     stages: "PipelineConfig",
     episode_control: "EpisodeControl | None",
@@ -201,10 +227,10 @@ def drive(
 
     Args:
         env: Environment, made; the caller closes it.
-        names: Robot and benchmark, for titles.
+        page: Page of the session, which the caller stops; None for a device alone.
+        title: Names of the robots and of the benchmark.
         rate: Actions per second, Hz.
         seed: Seed of every reset but those of recordings.
-        address: Where the page is served, host and port; None for a device alone.
         device: A device beside the page.
         stages: Stages between inputs and the controller.
         episode_control: Starts and ends recorded episodes.
@@ -212,7 +238,6 @@ def drive(
     from wbc_suite.devices.headset import Headset
     from wbc_suite.viewers.headset_view import SessionView
     from wbc_suite.viewers.loop_timing import prepare_interpreter
-    from wbc_suite.viewers.page_process import PageProcess
     from wbc_suite.viewers.status_text import timing_text
     from wbc_suite.viewers.teleop_session import TeleopSession
 
@@ -224,35 +249,26 @@ def drive(
         pipeline=stages,
         episode_control=episode_control,
     )
-    robots, benchmark = names
-    page = None
     try:
-        if address is not None:  # it gets ready while the controllers are compiled
-            label = f"{robots} · {benchmark}"
-            page = PageProcess(session, *address, label=label)
         if device is not None:
             device.start()
-        print("Preparing the controllers ...", flush=True)
         session.tick()
         if isinstance(device, Headset):
-            device.show(SessionView(session, f"{robots} · {benchmark}"))
+            device.show(SessionView(session, title))
         if page is not None:
-            page.wait()
+            page.attach(session)
         prepare_interpreter()
         session.start(urgent=True)
         print(getattr(device, "help", ""), end="", flush=True)
-        if page is None:
-            while session.running and not session.quit.wait(POLL_PERIOD):
-                pass
-        else:
-            title = f"Teleoperation of {robots}, {benchmark}:"
-            serve_until_interrupted(page, title, until=session.quit)
+        print("Ready. Press Ctrl-C to stop.", flush=True)
+        shown = page is not None  # it says what ended the loop
+        while (shown or session.running) and not session.quit.wait(POLL_PERIOD):
+            pass
+        if page is not None:
             page.check()
     finally:
         session.stop()
         if session.snapshot.tick > 1:
             print(timing_text(session.snapshot), flush=True)
-        if page is not None:
-            page.stop()
         if device is not None:
             device.stop()

@@ -11,15 +11,15 @@ from typing import Protocol
 
 from aiohttp import web
 
-from wbc_suite.devices.certificate import (
+from wbc_suite.devices.qr_code import qr_svg, qr_text
+from wbc_suite.devices.stream import Stream
+from wbc_suite.errors import ConfigError, DeviceError
+from wbc_suite.web.certificate import (
     fingerprint,
     installation_certificate,
     server_context,
 )
-from wbc_suite.devices.qr_code import qr_svg, qr_text
-from wbc_suite.devices.stream import Stream
-from wbc_suite.devices.web_server import is_loopback
-from wbc_suite.errors import ConfigError, DeviceError
+from wbc_suite.web.server import is_loopback
 
 VIEW_PERIOD = 1.0 / 60.0  # s, of the poses that are sent to a page
 TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}

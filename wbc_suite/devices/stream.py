@@ -13,11 +13,11 @@ from importlib import resources
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from wbc_suite.devices.certificate import installation_certificate, server_context
 from wbc_suite.devices.pose_frame import MAX_BUTTONS, MAX_BYTES, PoseFrame
 from wbc_suite.devices.state import DeviceState
-from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
+from wbc_suite.web.certificate import installation_certificate, server_context
+from wbc_suite.web.server import WebServer, page_url, token_for
 
 SOCKET = "/frames"
 SENDERS = 8  # connected at a time; only one of them moves the robot

@@ -145,7 +145,7 @@ class PolicyServer(socketserver.ThreadingTCPServer):
         port: int = 0,
         connections: int = CONNECTIONS,
     ) -> None:
-        from wbc_suite.devices.web_server import token_for  # aiohttp takes its time
+        from wbc_suite.web.server import token_for  # aiohttp takes its time
 
         self.begin, self.token = begin, token_for(host)
         self.large_messages = threading.BoundedSemaphore(LARGE_AT_ONCE)
@@ -160,7 +160,7 @@ class PolicyServer(socketserver.ThreadingTCPServer):
     @property
     def address(self) -> str:
         """What a client gives as its policy."""
-        from wbc_suite.devices.web_server import reachable_name
+        from wbc_suite.web.server import reachable_name
 
         host, port = self.server_address[:2]
         token = "" if self.token is None else f"{self.token}@"

@@ -4,70 +4,66 @@ Drawing a scene for several browsers takes Python's lock, for which the loop wou
 in the middle of a tick. So the page runs in another process, and the methods of
 `TeleopSession` are requests through a pipe, handled in order. The page waits for an
 answer only where it needs one: fast drags do not wait for the loop.
+
+The process starts before the session is made, which takes seconds, and a minute where
+kernels are compiled. Until then the page shows the robot: see `PreparingPage`.
 """
 
 import contextlib
-import functools
 import multiprocessing
 import signal
 import threading
-import time
 from collections.abc import Callable, Iterator
-from multiprocessing.connection import Connection
-from typing import Any, TypeAlias
-
-import pinocchio as pin
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from wbc_suite import logs
 from wbc_suite.errors import DeviceError
 from wbc_suite.viewers.loop_timing import raise_priority
-from wbc_suite.viewers.session_state import SessionInfo, Snapshot
-from wbc_suite.viewers.teleop_session import TeleopSession
+from wbc_suite.viewers.remote_session import QUERIES, SIGNALS, RemoteSession, serve
+
+if TYPE_CHECKING:
+    from wbc_suite.viewers.teleop_session import TeleopSession
 
 log = logs.logger(__name__)
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
 POLL_PERIOD = 0.05  # s
 EXIT_TIMEOUT = 10.0  # s; a page that has not ended by then is killed
 
-QUERIES = ("info", "snapshot", "grab")
-"""Requests that have an answer, for which the page waits."""
-
-COMMANDS = (
-    "release",
-    "leave",
-    "enable",
-    "set_gripper",
-    "drive",
-    "ride",
-    "watch_balance",
-    "pause",
-    "reset",
-    "command_episode",
-)
-"""Methods of the session that the page calls as they are, without an answer."""
-
 
 class PageProcess:
-    """Serve a session's page from another process; for host and port see `PageServer`.
+    """Serve a page from another process, at first of a robot, then of a session.
+
+    Args:
+        host: See `PageServer`.
+        port: See `PageServer`.
+        label: Title of the panel.
+        robot: Name or file of the robot that is shown until `attach`.
+        on_open: Called in a thread when the page can be opened.
 
     Attributes:
-        url: The address that opens the page.
+        url: The address that opens the page; empty until then.
         token: Secret that clients need; None on a loopback address.
         pid: Number of the process.
     """
 
     def __init__(
-        self, session: TeleopSession, host: str, port: int | None, *, label: str
+        self,
+        host: str,
+        port: int | None,
+        *,
+        label: str,
+        robot: str = "",
+        on_open: Callable[["PageProcess"], None] = lambda _: None,
     ) -> None:
         self.url, self.token = "", None
-        self._session, self._error = session, ""
-        self._opened, self._stopping = threading.Event(), threading.Event()
+        self._session: TeleopSession | None = None
+        self._error, self._on_open = "", on_open
+        self._ready, self._stopping = threading.Event(), threading.Event()
         context = multiprocessing.get_context("spawn")
         self._pipe, remote = context.Pipe()
-        arguments = remote, host, port, label
+        arguments = remote, host, port, label, robot
         self._process = context.Process(
-            target=_serve, args=arguments, name="page", daemon=True
+            target=serve, args=arguments, name="page", daemon=True
         )
         with _signals_wait():
             self._process.start()
@@ -76,9 +72,10 @@ class PageProcess:
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
         self._thread.start()
 
-    def wait(self) -> None:
-        """Wait until the page can be opened; see `check`."""
-        self._opened.wait()
+    def attach(self, session: "TeleopSession") -> None:
+        """Show a session from now on; wait until the page does so. See `check`."""
+        self._session = session
+        self._ready.wait()
         self.check()
 
     def check(self) -> None:
@@ -105,12 +102,13 @@ class PageProcess:
             self._pipe.close()  # ends the page's process
             if not self._stopping.is_set():
                 self._end_session()
-            self._opened.set()
+            self._ready.set()
 
     def _handle_requests(self) -> None:
         while not self._stopping.is_set():
             if self._pipe.poll(POLL_PERIOD):
-                self._session.timer.idle.wait(POLL_PERIOD)  # both need Python's lock
+                if self._session is not None:  # both need Python's lock
+                    self._session.timer.idle.wait(POLL_PERIOD)
                 request, arguments = self._pipe.recv()
                 answer = None
                 try:
@@ -124,9 +122,15 @@ class PageProcess:
         match request:
             case "opened":
                 self.url, self.token = arguments
-                self._opened.set()
+                self._on_open(self)
             case "failed":
                 (self._error,) = arguments
+            case "progress":
+                from wbc_suite.compiling import progress_text  # heavy
+
+                return progress_text() if self._session is None else None
+            case "ready":
+                self._ready.set()
             case "info" | "snapshot":
                 return getattr(self._session, request)
             case _:
@@ -138,58 +142,15 @@ class PageProcess:
         self._error = self._error or (
             f"The page's process ended by itself (exit code {self._process.exitcode})."
         )
+        if self._session is None:
+            return
         for status in self._session.snapshot.limbs.values():
             if status.holder is not None:
                 self._session.leave(status.holder)
         self._session.quit.set()
 
 
-class RemoteSession:
-    """A `TeleopSession` in another process; its other methods are those in `COMMANDS`.
-
-    Attributes:
-        lost: Set when the session has ended; requests do nothing from then on.
-    """
-
-    def __init__(self, pipe: Connection) -> None:
-        self.lost = threading.Event()
-        self._pipe, self._lock = pipe, threading.Lock()
-        self.info: SessionInfo = self.call("info")
-        self._last: Snapshot = self.call("snapshot")
-
-    @property
-    def snapshot(self) -> Snapshot:
-        """The newest state, or the last one before the session was lost."""
-        self._last = self.call("snapshot") or self._last
-        return self._last
-
-    def grab(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
-        """See `TeleopSession`."""
-        return bool(self.call("grab", name, client, T_world_input))
-
-    def drag(self, name: str, client: int, T_world_input: pin.SE3) -> None:
-        """See `TeleopSession`; returns before the session has handled it."""
-        arrived = time.perf_counter()  # the same clock in all processes
-        self.call("drag", name, client, T_world_input, arrived)
-
-    def __getattr__(self, name: str) -> Callable[..., None]:
-        """Return a method of `TeleopSession` that sends its call."""
-        if name not in COMMANDS:
-            raise AttributeError(f"A session in another process has no '{name}'.")
-        return functools.partial(self.call, name)
-
-    def call(self, request: str, *arguments: Any) -> Any:
-        """Send a request; return the answer of a query, None if the session is lost."""
-        with self._lock:
-            try:
-                self._pipe.send((request, arguments))
-                return self._pipe.recv() if request in QUERIES else None
-            except (EOFError, OSError):
-                self.lost.set()
-                return None
-
-
-Session: TypeAlias = TeleopSession | RemoteSession
+Session: TypeAlias = "TeleopSession | RemoteSession"
 """What a page displays and commands. Clients are numbers, one for each open page."""
 
 
@@ -214,25 +175,3 @@ def _signals_wait() -> Iterator[None]:
             signal.signal(number, handler)
     for number in waiting:
         signal.raise_signal(number)
-
-
-def _serve(pipe: Connection, host: str, port: int | None, label: str) -> None:
-    """Serve the page until the session ends: the main function of the process."""
-    from wbc_suite.viewers.page_server import PageServer
-    from wbc_suite.viewers.teleop_page import TeleopPage
-
-    for number in SIGNALS:  # the session ends this process
-        signal.signal(number, signal.SIG_IGN)
-    session = RemoteSession(pipe)
-    if session.lost.is_set():
-        return
-    try:
-        site = PageServer(host, port)
-    except DeviceError as error:
-        session.call("failed", str(error))
-        return
-    page = TeleopPage(session, site, label=label)
-    page.start()
-    session.call("opened", site.url, site.token)
-    session.lost.wait()
-    page.stop()

@@ -22,10 +22,10 @@ import aiohttp
 from aiohttp import WSMsgType, hdrs, web
 
 from wbc_suite import logs
-from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
 from wbc_suite.viewers import page_messages
 from wbc_suite.viewers.held_keys import HeldKeys
+from wbc_suite.web.server import WebServer, page_url, token_for
 
 log = logs.logger(__name__)
 

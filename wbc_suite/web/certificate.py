@@ -8,9 +8,9 @@ import subprocess
 from pathlib import Path
 
 from wbc_suite.catalogue import user_config
-from wbc_suite.devices.web_server import reachable_name
 from wbc_suite.errors import ConfigError, DeviceError
 from wbc_suite.files import check_file, read_bytes
+from wbc_suite.web.server import reachable_name
 
 BEGIN, END = (f"-----{word} CERTIFICATE-----" for word in ("BEGIN", "END"))
 MAX_BYTES = 1_000_000  # of a certificate or key

@@ -8,9 +8,9 @@ import time
 import pytest
 from aiohttp import web
 
-from wbc_suite.devices import web_server
-from wbc_suite.devices.web_server import WebServer, is_loopback
 from wbc_suite.errors import DeviceError
+from wbc_suite.web import server as web_server
+from wbc_suite.web.server import WebServer, is_loopback
 
 TOKEN = "right-token"
 PATIENCE = 60.0  # s, for a busy machine

@@ -7,12 +7,12 @@ from contextlib import suppress
 
 import pytest
 
-from wbc_suite.devices.certificate import (
+from wbc_suite.errors import DeviceError
+from wbc_suite.web.certificate import (
     fingerprint,
     installation_certificate,
     server_context,
 )
-from wbc_suite.errors import DeviceError
 
 pytestmark = pytest.mark.skipif(not shutil.which("openssl"), reason="needs openssl")
 

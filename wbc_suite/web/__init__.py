@@ -1,0 +1,1 @@
+"""HTTP: the server of pages and streams, its access rules and certificates."""
