@@ -1,12 +1,12 @@
 # Everything a newcomer or a build machine types. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help teleop demo test test-versions check format docs bench bench-peers clients pictures gallery wheel clean
+.PHONY: help teleop demo test test-all test-versions check format docs bench bench-peers clients pictures gallery wheel clean
 
 VENV := .venv
 PY := $(VENV)/bin/python
 PYTEST := $(PY) -m pytest
 CLIENTS := $(notdir $(basename $(wildcard examples/clients/*.py)))
-FAST := -m "not slow and not browser and not peer"
+FAST := -m "not slow and not sweep and not browser and not peer"
 export PYTHON
 
 help: ## list the commands
@@ -18,7 +18,10 @@ teleop: $(VENV)/.installed ## move a humanoid's hands in a web page (ARGS="--rob
 demo: $(VENV)/.installed ## the same without a browser: prints figures, writes pictures
 	@$(PY) -m wbc_suite.cli demo $(ARGS)
 
-test: $(VENV)/.installed-dev ## run the whole test suite
+test: $(VENV)/.installed-dev ## run the test suite
+	$(PYTEST) -n auto --durations=20 -m "not sweep" $(ARGS)
+
+test-all: $(VENV)/.installed-dev ## run every case, also of sweeps: about an hour
 	$(PYTEST) -n auto --durations=20 $(ARGS)
 
 test-versions: $(VENV)/.installed-dev ## fast tests with the lowest and the newest packages, and without JIT

@@ -28,7 +28,7 @@ from wbc_suite.cli.options import progress
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import PhysicsError
 from wbc_suite.evaluation import make_policy
-from wbc_suite.experts import Workcell
+from wbc_suite.experts import ExpertScene
 from wbc_suite.typing import Vector
 
 ALL = (
@@ -147,7 +147,7 @@ class Search:
         check, self._free = self.check(), 0
         for action in actions:
             yield self._advance(check, action)
-        cell = Workcell(env, self.benchmark, np.random.default_rng(0))
+        cell = ExpertScene(env, self.benchmark, np.random.default_rng(0))
         act = self._robot(attack.robot, draw, cell)
         move = self._move(attack.move, draw, cell)
         for k in range(STEPS):
@@ -182,7 +182,7 @@ class Search:
         states = [benchmark.states[name] for name in names]
         return [state.body for state in states if state.is_free]
 
-    def _goals(self, cell: Workcell[Any]) -> list[Vector]:
+    def _goals(self, cell: ExpertScene[Any]) -> list[Vector]:
         """Return points to throw things at: goals, things and hands."""
         model, data = self.model, self.data
         if hasattr(self.benchmark, "sorting"):
@@ -198,7 +198,7 @@ class Search:
         return points + [arm.pose.translation for arm in cell.arms]
 
     def _move(
-        self, kind: str, draw: Draw, cell: Workcell[Any]
+        self, kind: str, draw: Draw, cell: ExpertScene[Any]
     ) -> Callable[[int], None]:
         """Return what sets the forces on a body before action k."""
         bodies, goals = self._bodies(), self._goals(cell)
@@ -244,7 +244,7 @@ class Search:
         return self.data.subtree_com[self.model.body_rootid[body]]
 
     def _robot(
-        self, kind: str, draw: Draw, cell: Workcell[Any]
+        self, kind: str, draw: Draw, cell: ExpertScene[Any]
     ) -> Callable[[int], Vector]:
         """Return what gives action k."""
         env, arms = self.env, cell.arms

@@ -151,8 +151,8 @@ class Ours:
             warm=warm,
             **({} if defaults else options),
         )
-        ladder = self.stack._ladder
-        self.solver = ladder.solver = Timed(ladder.solver)
+        level = self.stack._level_solver
+        self.solver = level.solver = Timed(level.solver)
         self.targets = [[pin.SE3(T) for T in tick] for tick in targets]
         self.q = case.q.copy()
 

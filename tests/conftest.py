@@ -79,6 +79,22 @@ def peer_readers():
     return PeerReaders()
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what `sample` leaves out as a sweep: keep cases at even distances."""
+    cases: dict[object, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("sample"):
+            cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for same in cases.values():
+        marker = same[0].get_closest_marker("sample")
+        count = len(same)
+        kept = {k * count // marker.args[0] for k in range(marker.args[0])}
+        for k, item in enumerate(same):
+            if k not in kept:
+                item.add_marker(pytest.mark.sweep)
+
+
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 INTERPRETED_LIMIT = float(os.environ.get("WBC_SUITE_INTERPRETED_LIMIT", "1.0"))
 """s of CPU time."""

@@ -30,7 +30,7 @@ from wbc_suite.benchmark.two_arm_handover import HAMMER
 from wbc_suite.benchmark.two_arm_lift import POT
 from wbc_suite.benchmark.two_arm_transport import GOALS
 from wbc_suite.envs import RobotEnv
-from wbc_suite.experts import Workcell
+from wbc_suite.experts import ExpertScene
 from wbc_suite.experts.skills import UP, shifted
 
 SLACK = 0.01  # m, between where a thing must lie and where it does
@@ -45,7 +45,9 @@ class Check(ABC):
     def __init__(self, env: RobotEnv) -> None:
         self.env, self.benchmark = env, env.benchmark
         self.data, self.model = env.simulation.data, env.simulation.model
-        self.cell: Workcell[Any] = Workcell(env, env.benchmark, np.random.default_rng())
+        self.cell: ExpertScene[Any] = ExpertScene(
+            env, env.benchmark, np.random.default_rng()
+        )
 
     def after_step(self) -> str | None:
         """Look at the state after an action; return what was feigned, or None."""

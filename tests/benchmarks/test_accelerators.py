@@ -34,6 +34,7 @@ def folder(tmp_path_factory):
     return out
 
 
+@pytest.mark.sweep
 def test_mujoco_warp_steps_every_benchmark_as_mujoco(folder):
     found = step_in("warp", folder, CASES, steps=100, timeout=1800)
     assert set(found) == set(CASES)
@@ -44,11 +45,13 @@ def test_mujoco_warp_steps_every_benchmark_as_mujoco(folder):
     assert max(found[name]["all"] for name in EXACT) < 1e-5  # float32 beside float64
 
 
+@pytest.mark.sweep
 def test_mjx_takes_the_accelerator_variant_of_every_benchmark(folder):
     found = step_in("mjx", folder, CASES, steps=0, timeout=1800)
     assert found == {case: {"apart": 0.0, "all": 0.0} for case in CASES}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("case", ["Lift", "Lift-GR1", "WalkTo"])
 def test_mjx_steps_as_mujoco(folder, case):
     """With as many contacts as bodies could have: 998 in Lift, 5,005 with GR1."""

@@ -317,6 +317,7 @@ def raise_pot(pot):
     return pot.session.snapshot.success
 
 
+@pytest.mark.sweep
 def test_a_person_raises_the_pot_with_both_hands_and_records_it(
     room, peer_readers, tmp_path
 ):

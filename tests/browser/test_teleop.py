@@ -221,6 +221,7 @@ def test_closing_a_tab_gives_back_what_it_held(settled, context):
     wait_until(lambda: session.snapshot.limbs[HAND].holder is None, "it is given back")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("end", ENDS)
 def test_drag_whose_release_is_not_seen_ends(settled, context, monkeypatch, end):
     session, page = settled
@@ -272,6 +273,7 @@ def test_pause_whose_owner_has_left_is_ended_by_anybody(settled, context):
     wait_until(lambda: not session.snapshot.paused, "it goes on")
 
 
+@pytest.mark.sweep
 def test_shadows_are_for_whom_they_are_cheap(settled, context, monkeypatch):
     viewer = Viewer(context, settled[1].site, size=(960, 900))
     asked = []
@@ -285,6 +287,7 @@ def test_shadows_are_for_whom_they_are_cheap(settled, context, monkeypatch):
     wait_until(lambda: asked == [{"cast_shadow": False}], "the shadows go")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("robot", ["Tiago", "SpotWithArm"])
 def test_hand_of_every_robot_follows_the_mouse(robot, context):
     session, page = served(robot)

@@ -334,6 +334,7 @@ def test_thumbstick_drives_while_its_trigger_is_held(wearer):
     wearer.tell("device.controllers.left.updateAxes('thumbstick', 0, 0)")
 
 
+@pytest.mark.sweep
 def test_cube_is_lifted_with_a_tracked_hand(context, room, packages):
     session, device = room
     session.reset()

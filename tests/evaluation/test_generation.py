@@ -64,7 +64,11 @@ def test_failed_episodes_are_replaced_by_those_of_further_seeds(tmp_path):
 def test_it_gives_up_where_nothing_succeeds(tmp_path):
     out = tmp_path / "a.hdf5"
     found = generate(plan(policy="hold", only_success=True), out, episodes=1)
-    assert (found.kept, found.total, len(found.played)) == (0, 0, generation.MOST)
+    assert (found.kept, found.total, len(found.played)) == (
+        0,
+        0,
+        generation.TRIES_PER_EPISODE,
+    )
     assert not out.exists()
 
 

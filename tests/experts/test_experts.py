@@ -158,8 +158,8 @@ def test_an_expert_of_your_own_is_found_by_its_benchmark(forget):
     class MyLift(wbc_suite.benchmark.Lift):
         pass
 
-    def wave(cell):
-        cell.arms[0].open()
+    def wave(scene):
+        scene.arms[0].open()
         yield
 
     forget(EXPERTS, "MyLift")

@@ -10,8 +10,8 @@ import wbc_suite
 from wbc_suite.evaluation import make_policy
 from wbc_suite.experts.grasp_choice import Approach, choose_grasp
 from wbc_suite.experts.look_ahead import LookAhead
+from wbc_suite.experts.scene import ExpertScene
 from wbc_suite.experts.skills import close_in, come_before
-from wbc_suite.experts.workcell import Workcell
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import TaskStack
 
@@ -20,23 +20,23 @@ ARM = "sh0", "sh1", "el0", "el1", "wr0", "wr1"
 
 
 @pytest.fixture(scope="module")
-def cell():
+def scene():
     env = wbc_suite.make("Lift", robots="Panda")
     env.reset(seed=0)
-    return Workcell(env, env.benchmark, np.random.default_rng(0))
+    return ExpertScene(env, env.benchmark, np.random.default_rng(0))
 
 
 def shifted(pose, offset):
     return pin.SE3(pose.rotation, pose.translation + np.asarray(offset))
 
 
-def test_poses_in_reach_are_met_by_the_configurations_found(cell):
-    (arm,) = cell.arms
+def test_poses_in_reach_are_met_by_the_configurations_found(scene):
+    (arm,) = scene.arms
     poses = [shifted(arm.pose, o) for o in ((0.1, 0.0, 0.0), (0.1, 0.1, -0.1))]
-    outlook = arm.look_ahead(poses)
-    assert outlook.error < 1e-3
+    prediction = arm.look_ahead(poses)
+    assert prediction.error < 1e-3
     robot = Configuration(arm.state.robot.to_pinocchio())
-    for q, pose in zip(outlook.q, poses, strict=True):
+    for q, pose in zip(prediction.q, poses, strict=True):
         robot.update(arm.configuration(q))
         found = robot.frame_pose(arm.hand.frame)
         assert np.linalg.norm(found.translation - pose.translation) < 1e-3
@@ -44,16 +44,16 @@ def test_poses_in_reach_are_met_by_the_configurations_found(cell):
         assert ((robot.q >= low - 1e-9) & (robot.q <= high + 1e-9)).all()
 
 
-def test_a_pose_out_of_reach_costs_more_than_any_other(cell):
-    (arm,) = cell.arms
+def test_a_pose_out_of_reach_costs_more_than_any_other(scene):
+    (arm,) = scene.arms
     near = arm.look_ahead([shifted(arm.pose, (0.1, 0.0, 0.0))])
     far = arm.look_ahead([shifted(arm.pose, (1.5, 0.0, 0.0))])
     assert far.error > 0.5
     assert far.cost > near.cost + 50.0
 
 
-def test_a_look_ahead_with_a_bound_leaves_only_what_costs_more(cell):
-    (arm,) = cell.arms
+def test_a_look_ahead_with_a_bound_leaves_only_what_costs_more(scene):
+    (arm,) = scene.arms
     rng = np.random.default_rng(0)
     left = 0
     for _ in range(40):
@@ -69,8 +69,8 @@ def test_a_look_ahead_with_a_bound_leaves_only_what_costs_more(cell):
     assert 10 < left < 30
 
 
-def test_a_sweep_ends_at_the_pose_of_its_joints(cell):
-    (arm,) = cell.arms
+def test_a_sweep_ends_at_the_pose_of_its_joints(scene):
+    (arm,) = scene.arms
     goal = shifted(arm.pose, (0.1, 0.1, -0.1))
     q, period = arm.look_ahead([goal]).q[-1], 0.05
     poses = arm.sweep(q, period)
@@ -85,8 +85,8 @@ def test_a_sweep_ends_at_the_pose_of_its_joints(cell):
     assert max(steps) < 2.0 * np.mean(steps)
 
 
-def test_a_chain_in_two_parts_is_the_chain(cell):
-    (arm,) = cell.arms
+def test_a_chain_in_two_parts_is_the_chain(scene):
+    (arm,) = scene.arms
     a, b = (shifted(arm.pose, o) for o in ((0.05, 0.0, 0.0), (0.0, 0.1, 0.0)))
     whole, parts = (
         arm.look_ahead([a, b]),
@@ -98,21 +98,21 @@ def test_a_chain_in_two_parts_is_the_chain(cell):
 
 
 @pytest.mark.slow
-def test_a_configuration_in_the_table_is_not_clear(cell):
-    (arm,) = cell.arms
+def test_a_configuration_in_the_table_is_not_clear(scene):
+    (arm,) = scene.arms
     into = shifted(arm.pose, (0.0, 0.0, -0.3))
     q = arm.configuration(arm.look_ahead([into]).q[-1])
-    assert cell.overlap(arm, q, but="cube") > 0.01
+    assert scene.overlap(arm, q, but="cube") > 0.01
     here = arm.configuration(arm.look_ahead([arm.pose]).q[-1])
-    assert cell.overlap(arm, here, but="cube") == 0.0
+    assert scene.overlap(arm, here, but="cube") == 0.0
 
 
 @pytest.mark.slow
 def test_open_fingers_meet_what_lies_beside_an_object_and_closed_ones_do_not():
     env = wbc_suite.make("Stack", robots="Panda")
     env.reset(seed=0)
-    cell = Workcell(env, env.benchmark, np.random.default_rng(0))
-    (arm,) = cell.arms
+    scene = ExpertScene(env, env.benchmark, np.random.default_rng(0))
+    (arm,) = scene.arms
     a, b = (env.benchmark.states[name] for name in ("cubeA", "cubeB"))
     a.move((0.0, 0.0, 0.82))
     at = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 0.83]))
@@ -120,7 +120,7 @@ def test_open_fingers_meet_what_lies_beside_an_object_and_closed_ones_do_not():
     fingers = arm.closing("pinch")
     for y, is_met in ((0.07, True), (0.15, False)):
         b.move((0.0, y, 0.825))
-        depths = [cell.overlap(arm, q, but="cubeA", fingers=f) for f in fingers]
+        depths = [scene.overlap(arm, q, but="cubeA", fingers=f) for f in fingers]
         assert (depths[0] > 0.003) == is_met
         assert depths[-1] == 0.0
 
@@ -143,18 +143,18 @@ def test_a_choice_of_grasp_among_many_ways_solves_few_problems(monkeypatch):
 def test_a_hand_beside_its_way_stays_back():
     env = wbc_suite.make("Lift", robots="Panda")
     env.reset(seed=0)
-    cell = Workcell(env, env.benchmark, np.random.default_rng(0))
-    choice = choose_grasp(cell, "cube", arms=cell.arms, approach=Approach())
+    scene = ExpertScene(env, env.benchmark, np.random.default_rng(0))
+    choice = choose_grasp(scene, "cube", arms=scene.arms, approach=Approach())
 
     def run(skill):
         for _ in skill:
-            env.step(cell.action())
-            yield choice.hand_at(cell.pose("cube")).actInv(choice.arm.pose).translation
+            env.step(scene.action())
+            yield choice.hand_at(scene.pose("cube")).actInv(choice.arm.pose).translation
 
-    assert all(len(place) == 3 for place in run(come_before(cell, choice)))
-    x, y, z = cell.object("cube").position
-    cell.object("cube").move((x, y + 0.04, z))
-    places = np.array([*run(close_in(cell, "cube", choice))])
+    assert all(len(place) == 3 for place in run(come_before(scene, choice)))
+    x, y, z = scene.object("cube").position
+    scene.object("cube").move((x, y + 0.04, z))
+    places = np.array([*run(close_in(scene, "cube", choice))])
     beside, back = np.linalg.norm(places[:, :2], axis=1), -places[:, 2]
     assert beside[0] > 0.02
     assert back[beside > 0.015].min() > 0.04
@@ -195,7 +195,7 @@ def test_a_cube_that_slips_away_is_grasped_again():
 def test_both_hands_of_a_shared_waist_meet_their_poses():
     env = wbc_suite.make("TwoArmLift", robots="GR1", controller_configs="WHOLE_BODY_IK")
     env.reset(seed=0)
-    arms = Workcell(env, env.benchmark, np.random.default_rng(0)).arms
+    arms = ExpertScene(env, env.benchmark, np.random.default_rng(0)).arms
     assert arms[0].shares_joints(arms[1])
     robot = Configuration(arms[0].state.robot.to_pinocchio())
     joints = [n for n in arms[0].state.robot.joint_names if n.startswith(MOVING)]
@@ -205,9 +205,9 @@ def test_both_hands_of_a_shared_waist_meet_their_poses():
     poses = [robot.frame_pose(frame) for frame in frames]
     apart = [shifted(p, (x, 0.0, 0.0)) for p, x in zip(poses, (0.3, 0.0), strict=True)]
     look_ahead = LookAhead(arms[0].state, joints, *frames)
-    outlook = look_ahead.along([apart])
-    assert outlook.error < 1e-3
-    robot.update(look_ahead.full(outlook.q[-1]))
+    prediction = look_ahead.along([apart])
+    assert prediction.error < 1e-3
+    robot.update(look_ahead.full(prediction.q[-1]))
     for frame, pose in zip(frames, apart, strict=True):
         found = robot.frame_pose(frame)
         assert np.linalg.norm(found.translation - pose.translation) < 1e-3
@@ -223,7 +223,7 @@ def test_the_trunk_of_a_robot_on_its_feet_stays_where_it_is():
         "Lift", robots="SpotWithArm", controller_configs="WHOLE_BODY_IK"
     )
     env.reset(seed=0)
-    (arm,) = Workcell(env, env.benchmark, np.random.default_rng(0)).arms
+    (arm,) = ExpertScene(env, env.benchmark, np.random.default_rng(0)).arms
     model = arm.state.robot.to_pinocchio()
     own = [model.joints[model.getJointId(f"arm_{j}")].idx_q for j in ARM]
     others = np.setdiff1d(np.arange(model.nq), own)

@@ -303,7 +303,7 @@ def test_a_solver_that_answers_nonsense_is_not_believed(arm, monkeypatch, all_li
     """Daqp takes its place; if that lies too, coordinate descent does."""
     stack = arm_stack(arm, warm=False)
     shift(stack.tasks[0], [0.0, 0.1, 0.0])
-    stack._ladder.solver = Liar()
+    stack._level_solver.solver = Liar()
     if all_lie:
         monkeypatch.setattr(fallback, "DaqpSolver", Liar)
     before = np.linalg.norm(stack.tasks[0].error(arm))

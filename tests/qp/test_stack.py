@@ -61,7 +61,7 @@ def test_solution_meets_its_kkt_conditions(humanoid, rng):
         np.testing.assert_allclose(x[at_lower], problem.lb[at_lower], atol=1e-10)
         assert (x <= problem.ub + 1e-12).all()
         assert (x >= problem.lb - 1e-12).all()
-        by_daqp, _ = stack._ladder.solver.solve(problem)
+        by_daqp, _ = stack._level_solver.solver.solve(problem)
         np.testing.assert_allclose(x, by_daqp, atol=1e-10)
         humanoid.update(humanoid.integrate(solution.dq))
 

@@ -14,10 +14,10 @@ MAX_BYTES = 32_768
 """Maximum size of a frame; two hands with all their joints take 4 kB."""
 MAX_BUTTONS = 32
 
-FAR = 1e6
+LARGEST_NUMBER = 1e6
 """Greatest absolute value of a number in a frame, in any unit."""
 
-Number = Annotated[float, Field(ge=-FAR, le=FAR)]
+Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
 Point = tuple[Number, Number, Number]
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 

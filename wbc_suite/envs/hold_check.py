@@ -21,7 +21,7 @@ from wbc_suite.scene.objects import SceneObject
 from wbc_suite.typing import Vector
 
 SECONDS = 1.0
-MOST = 0.1
+GREATEST_DRIFT = 0.1
 """Largest displacement of a joint, rad or m, that counts as standing still."""
 LIGHT = 1e-4
 """kg m^2; a joint with less inertia and no armature oscillates at a step of 2 ms."""
@@ -121,7 +121,7 @@ def _moved(
     for joint in robot.joints:
         own = m.joint(f"{robot_prefix(0)}{joint.name}")
         moved = float(away[own.qposadr[0]])
-        if not moved <= MOST:
+        if not moved <= GREATEST_DRIFT:
             v = int(own.dofadr[0])
             cause = _cause(robot, joint.name, m.dof_M0[v], weight[v])
             unit = "rad" if joint.type == "hinge" else "m"

@@ -18,7 +18,7 @@ from wbc_suite.recording.resumable_work import reading_pieces, run_pieces, work_
 from wbc_suite.wrappers import DataCollection, Disturbance
 
 PART = 20  # episodes of a work item
-MOST = 20  # episodes that are played for each that is wanted, at most
+TRIES_PER_EPISODE = 20  # episodes that are played for each that is wanted, at most
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -75,9 +75,9 @@ def generate(
 ) -> Generated:
     """Record so many episodes, and add them to a file in the order of their seeds.
 
-    Seeds are taken one after the other until enough episodes are kept, or `MOST` times
-    as many are played. Finished items wait in `OUT.work`: the same call goes on there.
-    `on_kept` is called with the number of episodes that an item kept.
+    Seeds are taken one after the other until enough episodes are kept, or
+    `TRIES_PER_EPISODE` times as many are played. Finished items wait in `OUT.work`:
+    the same call goes on there. `on_kept` is called with the number of episodes that an item kept.
 
     Raises:
         DatasetError: If an item fails, or the file is of another environment.
@@ -86,11 +86,11 @@ def generate(
     done: list[tuple[WorkItem, Mapping[str, Any]]] = []
     told: set[str] = set()
     names: list[tuple[Path, str]] = []
-    while len(names) < episodes and tried < MOST * episodes:
+    while len(names) < episodes and tried < TRIES_PER_EPISODE * episodes:
         missing = episodes - len(names)
         if tried:  # as many as the share kept so far lets expect
             missing = math.ceil(missing * (tried + 1) / (len(names) + 1))
-        last = min(tried + missing, MOST * episodes)
+        last = min(tried + missing, TRIES_PER_EPISODE * episodes)
         for k in range(tried, last, PART):
             parts.append([first_seed + s for s in range(k, min(k + PART, last))])
         tried = last

@@ -2,13 +2,13 @@
 
 from wbc_suite.experts.multiplication import Multiplied
 from wbc_suite.experts.registry import EXPERTS, expert, find_expert, register_expert
-from wbc_suite.experts.workcell import Steps, Workcell
+from wbc_suite.experts.scene import ExpertScene, Steps
 
 __all__ = [
     "EXPERTS",
+    "ExpertScene",
     "Multiplied",
     "Steps",
-    "Workcell",
     "expert",
     "find_expert",
     "register_expert",

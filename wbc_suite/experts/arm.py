@@ -11,13 +11,16 @@ from wbc_suite.control import ActionLayout, RobotState
 from wbc_suite.control.action import ActionSlice
 from wbc_suite.devices.action_ports import LimbPort
 from wbc_suite.experts.finger_reach import closing_postures, finger_reach
-from wbc_suite.experts.look_ahead import LookAhead, Outlook
+from wbc_suite.experts.look_ahead import LookAhead, Prediction
 from wbc_suite.sensing.hands import Hand
 from wbc_suite.typing import Vector
 
 SPEED, TURN = 0.6, 3.0  # m/s, rad/s of goals
 LEAD = 0.08  # m; a goal waits for a hand that lags farther behind
-CORRECTION, MOST = 0.3, 0.02  # share of a resting error; greatest correction, m
+CORRECTION, LARGEST_CORRECTION = (
+    0.3,
+    0.02,
+)  # share of a resting error; greatest correction, m
 MOST_TURN = 0.15  # rad, likewise
 SETTLED = 0.03  # m; errors are resting errors below it
 
@@ -34,7 +37,7 @@ class Arm:
         home: Pose of the hand at the start.
         finger_reach: Returns how far fingers reach beyond the frame of a grasp, m.
         closing: Returns the joints of the gripper from open to closed for a grasp.
-        coupled: Whether other arms of the workcell share joints with it.
+        coupled: Whether other arms of the scene share joints with it.
     """
 
     def __init__(
@@ -84,9 +87,9 @@ class Arm:
         poses: Sequence[pin.SE3],
         grasp: str | None = None,
         *,
-        after: Outlook | None = None,
+        after: Prediction | None = None,
         most: float = math.inf,
-    ) -> Outlook:
+    ) -> Prediction:
         """Look along a chain of poses of a grasp's frame, by default the present.
 
         See `LookAhead.along`.
@@ -102,7 +105,7 @@ class Arm:
 
     def look_ahead_beside(
         self, other: "Arm", grasps: tuple[str, str], poses: Sequence[Sequence[pin.SE3]]
-    ) -> Outlook:
+    ) -> Prediction:
         """Look along a chain of poses of this hand and of another of the robot."""
         joints = tuple(dict.fromkeys((*self._joints, *other._joints)))
         frames = self._frame(grasps[0]), other._frame(grasps[1])
@@ -115,7 +118,7 @@ class Arm:
         self._look_ahead.cache_clear()
 
     def sweep(self, q: Vector, period: float) -> Sequence[pin.SE3]:
-        """Return poses on the way to joints as an outlook has them.
+        """Return poses on the way to joints as a prediction has them.
 
         See `LookAhead.sweep`.
         """
@@ -123,11 +126,11 @@ class Arm:
 
     @property
     def home_joints(self) -> Vector:
-        """Joints at the start, as an outlook has them."""
+        """Joints at the start, as a prediction has them."""
         return self._look_ahead(self.grasp).own(self._home)
 
     def configuration(self, q: Vector) -> Vector:
-        """Return the robot's configuration with joints as an outlook has them."""
+        """Return the robot's configuration with joints as a prediction has them."""
         return self._look_ahead(self.grasp).full(q)
 
     @property
@@ -225,7 +228,9 @@ class Arm:
         if not self._exact:
             self._correction[:] = 0.0
         elif np.linalg.norm(shift) < SETTLED:
-            self._correction = shortened(self._correction + CORRECTION * shift, MOST)
+            self._correction = shortened(
+                self._correction + CORRECTION * shift, LARGEST_CORRECTION
+            )
         if np.linalg.norm(turn) < MOST_TURN:
             turn = self._turn_correction + CORRECTION * turn
             self._turn_correction = shortened(turn, MOST_TURN)

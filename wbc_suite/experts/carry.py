@@ -8,8 +8,8 @@ from wbc_suite.benchmark import Carry
 from wbc_suite.benchmark.two_arm_lift import HANDLES, POT
 from wbc_suite.experts.arm import Arm
 from wbc_suite.experts.on_feet import walk
+from wbc_suite.experts.scene import ExpertScene, Steps, together, wait_until
 from wbc_suite.experts.skills import UP, move, shifted
-from wbc_suite.experts.workcell import Steps, Workcell, together, wait_until
 from wbc_suite.typing import Vector
 
 TRIES = 3
@@ -26,22 +26,22 @@ FREE = 0.03  # m, that hands go on below handles which they have left
 BACK = 0.3  # m, that the robot steps back with empty hands
 
 
-def carry(cell: Workcell[Carry]) -> Steps[None]:
+def carry(scene: ExpertScene[Carry]) -> Steps[None]:
     """Raise the pot by its handles from below, and carry it to the other table."""
-    walker, goal = cell.walker, cell.benchmark.config.other
+    walker, goal = scene.walker, scene.benchmark.config.other
     if walker is None:
         return
     for _ in range(TRIES):
-        yield from _raise(cell)
-        if cell.benchmark.hands_at_pot() == 2 and not cell.benchmark.supports():
+        yield from _raise(scene)
+        if scene.benchmark.hands_at_pot() == 2 and not scene.benchmark.supports():
             break
     x, y, _ = walker.place
     heading = math.atan2(goal[1] - y, goal[0] - x)
-    yield from walk(cell, x, y, heading)
-    yield from walk(cell, *_before(goal, heading, BEFORE))
-    yield from _put_down(cell)
+    yield from walk(scene, x, y, heading)
+    yield from walk(scene, *_before(goal, heading, BEFORE))
+    yield from _put_down(scene)
     x, y, heading = walker.place
-    yield from walk(cell, *_before((x, y, 0.0), heading, BACK))
+    yield from walk(scene, *_before((x, y, 0.0), heading, BACK))
 
 
 def _before(
@@ -52,25 +52,27 @@ def _before(
     return x - distance * math.cos(heading), y - distance * math.sin(heading), heading
 
 
-def _raise(cell: Workcell[Carry]) -> Steps[None]:
+def _raise(scene: ExpertScene[Carry]) -> Steps[None]:
     """Walk before the pot, bring the hands under its handles, and raise it."""
-    across, (x, y, _) = _across(cell), cell.pose(POT).translation.tolist()
+    across, (x, y, _) = _across(scene), scene.pose(POT).translation.tolist()
     heading = math.atan2(-across[0], across[1])
-    yield from walk(cell, *_before((x, y, 0.0), heading, AHEAD))
+    yield from walk(scene, *_before((x, y, 0.0), heading, AHEAD))
     for outwards, up in WAY:
-        yield from together(*(_reach(cell, arm, outwards, up) for arm in cell.arms))
-    up = [shifted(arm.pose, RISE * UP) for arm in cell.arms]
+        yield from together(*(_reach(scene, arm, outwards, up) for arm in scene.arms))
+    up = [shifted(arm.pose, RISE * UP) for arm in scene.arms]
     yield from together(
         *(
             move(arm, goal, speed=RAISING, most=40)
-            for arm, goal in zip(cell.arms, up, strict=True)
+            for arm, goal in zip(scene.arms, up, strict=True)
         )
     )
 
 
-def _reach(cell: Workcell[Carry], arm: Arm, outwards: float, up: float) -> Steps[bool]:
+def _reach(
+    scene: ExpertScene[Carry], arm: Arm, outwards: float, up: float
+) -> Steps[bool]:
     """Bring a hand beside the handle on its side, turned as it is."""
-    across, points = _across(cell), [cell.point(name) for name in HANDLES]
+    across, points = _across(scene), [scene.point(name) for name in HANDLES]
     side = 1.0 if arm.hand.name == "left" else -1.0
     handle = max(points, key=lambda point: float(side * across @ point))
     back = np.array([across[1], -across[0], 0.0])
@@ -83,28 +85,28 @@ def _reach(cell: Workcell[Carry], arm: Arm, outwards: float, up: float) -> Steps
     )
 
 
-def _across(cell: Workcell[Carry]) -> Vector:
+def _across(scene: ExpertScene[Carry]) -> Vector:
     """Return the level unit vector along the handles, to the left of the robot."""
-    along = cell.point(HANDLES[0]) - cell.point(HANDLES[1])
-    hands = {arm.hand.name: arm.hand.position for arm in cell.arms}
+    along = scene.point(HANDLES[0]) - scene.point(HANDLES[1])
+    hands = {arm.hand.name: arm.hand.position for arm in scene.arms}
     left = hands["left"] - hands["right"]
     along = np.array([*along[:2], 0.0]) * np.sign(along @ left)
     return along / np.linalg.norm(along)
 
 
-def _put_down(cell: Workcell[Carry]) -> Steps[None]:
+def _put_down(scene: ExpertScene[Carry]) -> Steps[None]:
     """Lower the hands until the pot stands and they have left its handles."""
-    _lower(cell, 2 * RISE)
+    _lower(scene, 2 * RISE)
 
     def stands_alone() -> bool:
-        pot = cell.benchmark
+        pot = scene.benchmark
         return bool(pot.supports()) and pot.hands_at_pot() == 0
 
     yield from wait_until(stands_alone, most=80)
-    _lower(cell, FREE)
+    _lower(scene, FREE)
     yield from wait_until(lambda: False, most=10)
 
 
-def _lower(cell: Workcell[Carry], way: float) -> None:
-    for arm in cell.arms:
+def _lower(scene: ExpertScene[Carry], way: float) -> None:
+    for arm in scene.arms:
         arm.aim(shifted(arm.pose, -way * UP), speed=LOWERING, exact=False)

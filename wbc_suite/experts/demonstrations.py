@@ -16,7 +16,7 @@ import pinocchio as pin
 from wbc_suite.benchmark import ObjectBenchmark
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import DatasetError
-from wbc_suite.experts.workcell import Workcell
+from wbc_suite.experts.scene import ExpertScene
 from wbc_suite.recording import Dataset, Episode, rebuild
 from wbc_suite.recording.replaying import start_as
 from wbc_suite.typing import Vector
@@ -110,50 +110,52 @@ def read_demonstrations(path: Path, written: int) -> tuple[Demonstration, ...]:
     return tuple(useful)
 
 
-def workcell(env: RobotEnv, rng: np.random.Generator) -> Workcell[Any]:
-    """Return the workcell of an environment, or raise DatasetError without objects."""
+def expert_scene(env: RobotEnv, rng: np.random.Generator) -> ExpertScene[Any]:
+    """Return the scene of an environment, or raise DatasetError without objects."""
     if not isinstance(env.benchmark, ObjectBenchmark):
         raise DatasetError(f"{env.benchmark.name} has no objects to grasp.")
-    return Workcell(env, env.benchmark, rng)
+    return ExpertScene(env, env.benchmark, rng)
 
 
 def _read(env: RobotEnv, episode: Episode) -> Demonstration:
     """Take the actions of an episode again, and note hands, goals and objects."""
     start_as(env, episode)
-    cell = workcell(env, np.random.default_rng(0))
-    names = [name for name, sites in cell.benchmark.grasps.items() if sites]
+    scene = expert_scene(env, np.random.default_rng(0))
+    names = [name for name, sites in scene.benchmark.grasps.items() if sites]
     objects: dict[str, list[pin.SE3]] = {name: [] for name in names}
-    rows: list[list[tuple[pin.SE3, pin.SE3, bool]]] = [[] for _ in cell.arms]
-    holds: list[list[str]] = [[] for _ in cell.arms]
+    rows: list[list[tuple[pin.SE3, pin.SE3, bool]]] = [[] for _ in scene.arms]
+    holds: list[list[str]] = [[] for _ in scene.arms]
     under: list[dict[str, str]] = []
     for action in episode.columns["actions"]:
         for name in names:
-            objects[name].append(cell.pose(name))
-        for arm, row, held in zip(cell.arms, rows, holds, strict=True):
+            objects[name].append(scene.pose(name))
+        for arm, row, held in zip(scene.arms, rows, holds, strict=True):
             row.append((arm.pose, *arm.read(action)))
-            held.append(next((n for n in names if cell.holds(arm, n)), ""))
-        under.append(dict(_supports(cell, names)))
+            held.append(next((n for n in names if scene.holds(arm, n)), ""))
+        under.append(dict(_supports(scene, names)))
         env.advance(action)
-    under.append(dict(_supports(cell, names)))  # an object may have just been released
+    under.append(dict(_supports(scene, names)))  # an object may have just been released
     tracks = [
-        _track(cell, row, held, objects, under)
+        _track(scene, row, held, objects, under)
         for row, held in zip(rows, holds, strict=True)
     ]
     return Demonstration(tracks=tracks, objects=objects)
 
 
-def _supports(cell: Workcell[Any], names: Sequence[str]) -> Iterator[tuple[str, str]]:
+def _supports(
+    scene: ExpertScene[Any], names: Sequence[str]
+) -> Iterator[tuple[str, str]]:
     """Yield objects that touch a lower one that can move, and this one."""
-    states = cell.benchmark.states
+    states = scene.benchmark.states
     free = [name for name in names if name in states and states[name].is_free]
     for one, other in itertools.permutations(free, 2):
-        lower = cell.object(other).position[2] < cell.object(one).position[2]
-        if lower and cell.touching(one, other):
+        lower = scene.object(other).position[2] < scene.object(one).position[2]
+        if lower and scene.touching(one, other):
             yield one, other
 
 
 def _track(
-    cell: Workcell[Any],
+    scene: ExpertScene[Any],
     row: Sequence[tuple[pin.SE3, pin.SE3, bool]],
     holds: list[str],
     objects: Mapping[str, Sequence[pin.SE3]],
@@ -166,7 +168,7 @@ def _track(
         last = k + 1 == len(runs)
         stop = len(holds) if last else min(end + WITHDRAWAL, runs[k + 1][0] - 1)
         path = np.array([pose.translation for pose in objects[name][begin:end]])
-        states = cell.benchmark.states
+        states = scene.benchmark.states
         moves = name in states and states[name].is_free
         onto = next((u[name] for u in under[end - 1 : stop + 1] if name in u), "")
         least = 0.0 if onto else STRAIGHT_UP

@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.experts.arm import Arm
-from wbc_suite.experts.look_ahead import Outlook
-from wbc_suite.experts.workcell import Workcell
+from wbc_suite.experts.look_ahead import Prediction
+from wbc_suite.experts.scene import ExpertScene
 from wbc_suite.scene.objects.grasp_site import GraspSite
 from wbc_suite.typing import Vector
 
@@ -25,7 +25,7 @@ MISS = 0.005  # m, between fingers and things beside an object, likewise
 MOST_LIFT = 0.03  # m, by which hands stay back for that
 STEEP = 0.7  # cosine, of approaches from above
 PAIRED = 8  # grasps of each arm that are looked at with those of the other
-GOOD = 1.0  # of outlooks; tilted grasps are looked at if none is so good
+GOOD = 1.0  # of predictions; tilted grasps are looked at if none is so good
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,7 @@ class Choice:
         grasp: Pose T_oh of the hand in the object's frame.
         then: Chain of poses of the object that follows.
         depth: How deep the robot gets in other things, m.
-        cost: Of the outlook, with penalties.
+        cost: Of the prediction, with penalties.
     """
 
     arm: Arm
@@ -68,7 +68,7 @@ class Choice:
     away: float
     grasp: pin.SE3
     then: tuple[pin.SE3, ...]
-    outlook: Outlook
+    prediction: Prediction
     depth: float
     cost: float
 
@@ -78,7 +78,7 @@ class Choice:
 
 
 def choose_grasp(
-    cell: Workcell,
+    scene: ExpertScene,
     name: str,
     *,
     arms: Sequence[Arm],
@@ -89,19 +89,19 @@ def choose_grasp(
     """Return the best grasp of an object; None if no site lies along the direction.
 
     Args:
-        cell: The workcell.
+        scene: The scene.
         name: The object.
         arms: The arms that may do it.
         approach: How it may be approached.
         then: Alternatives of where it will be carried, each a chain of its poses.
-        costs: Cost of each alternative beside its outlook, s.
+        costs: Cost of each alternative beside its prediction, s.
     """
-    found = _ranked(cell, name, arms, approach, then, costs)
+    found = _ranked(scene, name, arms, approach, then, costs)
     return found[0] if found else None
 
 
 def choose_pair(
-    cell: Workcell,
+    scene: ExpertScene,
     name: str,
     *,
     arms: Sequence[Arm],
@@ -116,14 +116,14 @@ def choose_pair(
     shared = arms[0].shares_joints(arms[1])
     several = {"count": PAIRED, "enough": 0.0} if shared else {}
     one, other = (
-        _ranked(cell, name, [arm], approach, [then], **several)
+        _ranked(scene, name, [arm], approach, [then], **several)
         for arm, approach in zip(arms, approaches, strict=True)
     )
     if not one or not other:
         return None
     if not shared:
         return one[0], other[0]
-    at = cell.pose(name)
+    at = scene.pose(name)
 
     def cost(pair: tuple[Choice, Choice]) -> float:
         chains = [(c.before, *(c.hand_at(T) for T in (at, *then))) for c in pair]
@@ -141,7 +141,7 @@ def choose_pair(
 
 
 def _ranked(
-    cell: Workcell,
+    scene: ExpertScene,
     name: str,
     arms: Sequence[Arm],
     approach: Approach,
@@ -163,14 +163,14 @@ def _ranked(
         begun = [
             choice
             for arm in arms
-            for site in cell.grasps(name)
+            for site in scene.grasps(name)
             if abs(tilt) <= site.tilt and site.name == approach.place
-            for choice in _begin(cell, name, arm, site, tilted(site, tilt), approach)
+            for choice in _begin(scene, name, arm, site, tilted(site, tilt), approach)
         ]
         for choice in sorted(begun, key=_cost):
             for way, extra in ways:
                 most = found[count - 1].cost if len(found) >= count else math.inf
-                whole = _follow(cell, name, choice, way, extra, most, approach.leave)
+                whole = _follow(scene, name, choice, way, extra, most, approach.leave)
                 if whole is not None:
                     insort(found, whole, key=_cost)
     return found
@@ -188,7 +188,7 @@ def tilted(site: GraspSite, tilt: float) -> pin.SE3:
 
 
 def _begin(
-    cell: Workcell,
+    scene: ExpertScene,
     name: str,
     arm: Arm,
     site: GraspSite,
@@ -196,29 +196,31 @@ def _begin(
     approach: Approach,
 ) -> Iterator[Choice]:
     """Yield a grasp, until the object is raised; nothing if its direction is wrong."""
-    at = cell.pose(name) * grasp
+    at = scene.pose(name) * grasp
     along = float(at.rotation[:, 2] @ approach.direction)
     if along < math.cos(approach.upright):
         return
 
-    def reach(back: float) -> tuple[pin.SE3, pin.SE3, Outlook]:
+    def reach(back: float) -> tuple[pin.SE3, pin.SE3, Prediction]:
         held = grasp * pin.SE3(np.eye(3), back * DOWN)
-        at = cell.pose(name) * held
+        at = scene.pose(name) * held
         away = approach.away * at.rotation[:, 2]
         before = pin.SE3(at.rotation, at.translation - away)
         up = pin.SE3(at.rotation, at.translation - approach.raised * DOWN)
         return held, before, arm.look_ahead([before, at, up], site.grasp)
 
-    back = _needed_lift(cell, name, arm, site.grasp, at)
+    back = _needed_lift(scene, name, arm, site.grasp, at)
     held, before, first = reach(back)
-    met = _overlap_while_closing(cell, name, arm, site.grasp, first)
+    met = _overlap_while_closing(scene, name, arm, site.grasp, first)
     if met > 0.0:  # something is behind the object: the hand stays back from it
         q, closing = arm.configuration(first.q[1]), arm.closing(site.grasp)
-        z = (cell.pose(name) * held).rotation[:, 2]
-        ahead = max(cell.overlap(arm, q, but=name, fingers=f, along=z) for f in closing)
+        z = (scene.pose(name) * held).rotation[:, 2]
+        ahead = max(
+            scene.overlap(arm, q, but=name, fingers=f, along=z) for f in closing
+        )
         if 0.0 < ahead < MOST_LIFT - back - ROOM:
             held, before, first = reach(back + ahead + ROOM)
-            met = _overlap_while_closing(cell, name, arm, site.grasp, first)
+            met = _overlap_while_closing(scene, name, arm, site.grasp, first)
     angle = ANGLE * math.acos(min(1.0, along))
     yield Choice(
         arm=arm,
@@ -227,14 +229,14 @@ def _begin(
         away=approach.away,
         grasp=held,
         then=(),
-        outlook=first,
+        prediction=first,
         depth=max(met, 0.0),
         cost=first.cost + angle + OVERLAP * max(met, 0.0),
     )
 
 
 def _follow(
-    cell: Workcell,
+    scene: ExpertScene,
     name: str,
     begun: Choice,
     way: tuple[pin.SE3, ...],
@@ -243,41 +245,43 @@ def _follow(
     leave: float,
 ) -> Choice | None:
     """Return a grasp with what follows it; None if it costs more than `most`."""
-    arm, first = begun.arm, begun.outlook
+    arm, first = begun.arm, begun.prediction
     spent = begun.cost - first.cost + extra
     if first.cost + spent > most:
         return None
     poses = [begun.hand_at(pose) for pose in way]
     if leave > 0.0:
         poses.append(poses[-1] * pin.SE3(np.eye(3), leave * DOWN))
-    outlook = arm.look_ahead(poses, begun.site.grasp, after=first, most=most - spent)
-    if outlook.cost + spent > most:
+    prediction = arm.look_ahead(poses, begun.site.grasp, after=first, most=most - spent)
+    if prediction.cost + spent > most:
         return None
-    carried = map(arm.configuration, outlook.q[len(first.q) :])
-    depth = max(begun.depth, *(cell.overlap(arm, q, but=name) for q in carried), 0.0)
-    cost = outlook.cost + spent + OVERLAP * (depth - begun.depth)
-    return replace(begun, then=way, outlook=outlook, depth=depth, cost=cost)
+    carried = map(arm.configuration, prediction.q[len(first.q) :])
+    depth = max(begun.depth, *(scene.overlap(arm, q, but=name) for q in carried), 0.0)
+    cost = prediction.cost + spent + OVERLAP * (depth - begun.depth)
+    return replace(begun, then=way, prediction=prediction, depth=depth, cost=cost)
 
 
-def _needed_lift(cell: Workcell, name: str, arm: Arm, grasp: str, at: pin.SE3) -> float:
+def _needed_lift(
+    scene: ExpertScene, name: str, arm: Arm, grasp: str, at: pin.SE3
+) -> float:
     """Return how far a hand must stay back for its fingers to clear the support, m."""
     down = -at.rotation.item(2, 2)
     if down < STEEP:
         return 0.0
-    room = (at.translation[2] - cell.bottom(name)) / down
+    room = (at.translation[2] - scene.bottom(name)) / down
     return min(max(arm.finger_reach(grasp) + CLEAR - room, 0.0), MOST_LIFT)
 
 
 def _overlap_while_closing(
-    cell: Workcell, name: str, arm: Arm, grasp: str, outlook: Outlook
+    scene: ExpertScene, name: str, arm: Arm, grasp: str, prediction: Prediction
 ) -> float:
     """Return how deep a hand that comes, closes and rises gets in other things, m.
 
     Fingers sweep over what lies beside the object while they close.
     """
-    before, at, up = map(arm.configuration, outlook.q)
+    before, at, up = map(arm.configuration, prediction.q)
     closing = arm.closing(grasp)
     moments = [(before, closing[0]), *((at, f) for f in closing), (up, closing[-1])]
     return max(
-        cell.overlap(arm, q, but=name, fingers=f, beside=MISS) for q, f in moments
+        scene.overlap(arm, q, but=name, fingers=f, beside=MISS) for q, f in moments
     )

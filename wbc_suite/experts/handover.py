@@ -9,8 +9,8 @@ import pinocchio as pin
 
 from wbc_suite.experts.arm import Arm
 from wbc_suite.experts.grasp_choice import Approach, choose_grasp
+from wbc_suite.experts.scene import ExpertScene, Steps
 from wbc_suite.experts.skills import UP, carry, grip, move, pick, release, shifted
-from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.typing import Vector
 
 ROLLS = tuple(np.linspace(0.0, 2.0 * math.pi, 8, endpoint=False))
@@ -19,7 +19,7 @@ SHARES = (0.5, 0.4, 0.6)  # of the way from the giving to the receiving arm
 
 
 def hand_over(
-    cell: Workcell,
+    scene: ExpertScene,
     name: str,
     *,
     giver: Arm,
@@ -33,7 +33,7 @@ def hand_over(
     """Pick an object up with one arm and give it to another.
 
     Args:
-        cell: The workcell.
+        scene: The scene.
         name: The object, long along its z axis.
         giver: The arm that picks it up.
         taker: The arm that has it in the end.
@@ -47,10 +47,10 @@ def hand_over(
         Whether the taker alone holds it.
     """
     for _ in range(tries):
-        if not cell.holds(giver, name):
-            meetings = _meetings(cell, name, giver, taker, places[1], height)
+        if not scene.holds(giver, name):
+            meetings = _meetings(scene, name, giver, taker, places[1], height)
             choice = yield from pick(
-                cell,
+                scene,
                 name,
                 then=[(pose,) for pose in meetings],
                 arms=[giver],
@@ -62,9 +62,9 @@ def hand_over(
                 return False
             (goal,) = choice.then
             yield from carry(
-                cell, giver, name, goal, tolerance=0.02, turn_tolerance=0.1
+                scene, giver, name, goal, tolerance=0.02, turn_tolerance=0.1
             )
-        if (yield from _receive(cell, name, giver, taker, places[1])):
+        if (yield from _receive(scene, name, giver, taker, places[1])):
             return True
         taker.open()
         yield from move(taker, taker.home, tolerance=0.05, most=40)
@@ -72,7 +72,7 @@ def hand_over(
 
 
 def _receive(
-    cell: Workcell, name: str, giver: Arm, taker: Arm, place: str
+    scene: ExpertScene, name: str, giver: Arm, taker: Arm, place: str
 ) -> Steps[bool]:
     """Grasp with the taker what the giver holds, and let the giver go."""
     towards = giver.pose.translation - taker.pose.translation
@@ -80,23 +80,23 @@ def _receive(
     approach = Approach(
         raised=0.0, away=0.1, upright=FACING, direction=direction, place=place
     )
-    choice = choose_grasp(cell, name, arms=[taker], approach=approach)
+    choice = choose_grasp(scene, name, arms=[taker], approach=approach)
     if choice is None:
         return False
     taker.open(choice.site.grasp)
     if not (yield from move(taker, choice.before, tolerance=0.02, turn_tolerance=0.2)):
         return False
-    yield from move(taker, lambda: choice.hand_at(cell.pose(name)), speed=0.3)
-    if not (yield from grip(cell, taker, name)):
+    yield from move(taker, lambda: choice.hand_at(scene.pose(name)), speed=0.3)
+    if not (yield from grip(scene, taker, name)):
         return False
     for _ in range(3):
         yield
     yield from release(giver, back=0.12)
-    return cell.holds(taker, name)
+    return scene.holds(taker, name)
 
 
 def _meetings(
-    cell: Workcell, name: str, giver: Arm, taker: Arm, place: str, height: float
+    scene: ExpertScene, name: str, giver: Arm, taker: Arm, place: str, height: float
 ) -> Sequence[pin.SE3]:
     """Return poses of the object that the taker reaches well, across both arms."""
     a, b = giver.pose.translation, taker.pose.translation
@@ -108,18 +108,23 @@ def _meetings(
         at = (1.0 - share) * a + share * b
         at[2] = height
         poses = [pin.SE3(_along(sign * across, roll), at) for roll in ROLLS]
-        cost = _cost_of_taking(cell, name, taker, place, poses[0], -way)
+        cost = _cost_of_taking(scene, name, taker, place, poses[0], -way)
         found.append((cost, poses))
     found.sort(key=lambda one: one[0])
     return [pose for _, poses in found[:3] for pose in poses]
 
 
 def _cost_of_taking(
-    cell: Workcell, name: str, taker: Arm, place: str, pose: pin.SE3, direction: Vector
+    scene: ExpertScene,
+    name: str,
+    taker: Arm,
+    place: str,
+    pose: pin.SE3,
+    direction: Vector,
 ) -> float:
     """Return the cost of the easiest grasp of the taker at a pose of the object."""
     least = math.inf
-    for site in cell.grasps(name):
+    for site in scene.grasps(name):
         at = pose * site.pose
         if site.name != place or at.rotation[:, 2] @ direction < math.cos(FACING):
             continue

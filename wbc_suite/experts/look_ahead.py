@@ -23,7 +23,7 @@ SINGULAR = 0.05  # dexterity below which controllers lag
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Outlook:
+class Prediction:
     """What hands would meet along a chain of poses.
 
     Attributes:
@@ -119,19 +119,19 @@ class LookAhead:
     def along(
         self,
         poses: Iterable[Sequence[pin.SE3]],
-        after: Outlook | None = None,
+        after: Prediction | None = None,
         *,
         most: float = math.inf,
-    ) -> Outlook:
+    ) -> Prediction:
         """Follow a chain of poses in the world, each one pose for each frame.
 
-        It begins where the hands are, or goes on `after` another outlook. It ends on
+        It begins where the hands are, or goes on `after` another prediction. It ends on
         the way once its cost is above `most`, as costs only grow; the error is
         what would be left if hands came nearer as fast as now.
         """
         configuration = self._configuration
         if after is None:
-            after = Outlook(
+            after = Prediction(
                 error=0.0,
                 margin=np.inf,
                 dexterity=np.inf,
@@ -152,7 +152,7 @@ class LookAhead:
                 break
         return replace(met, q=tuple(found))
 
-    def _descend(self, before: Outlook, most: float) -> Outlook:
+    def _descend(self, before: Prediction, most: float) -> Prediction:
         """Move to the targets of the tasks; return what was met up to there."""
         configuration, left, earlier = self._configuration, np.inf, np.inf
         travel, least = np.zeros(configuration.nv), before.dexterity
@@ -178,9 +178,9 @@ class LookAhead:
         return replace(met, margin=min(before.margin, float(gaps.min(initial=np.inf))))
 
     def _met(
-        self, before: Outlook, travel: Vector, least: float, error: float
-    ) -> Outlook:
-        """Return an outlook with how far joints went since, and what they met."""
+        self, before: Prediction, travel: Vector, least: float, error: float
+    ) -> Prediction:
+        """Return a prediction with how far joints went since, and what they met."""
         return replace(
             before,
             error=max(before.error, error),

@@ -21,11 +21,11 @@ from wbc_suite.experts.demonstrations import (
     Demonstration,
     Segment,
     Track,
+    expert_scene,
     read_demonstrations,
     shares_of_path,
-    workcell,
 )
-from wbc_suite.experts.workcell import Steps, Workcell
+from wbc_suite.experts.scene import ExpertScene, Steps
 from wbc_suite.typing import Vector
 
 QUARTER = np.array([0.0, 0.0, np.pi / 2])  # rad
@@ -37,7 +37,7 @@ ENDING = 10  # control periods after the last goal
 SAMPLES = (0.4, 0.7, 0.85, 1.0)  # of the path of a segment, where it is looked at
 COLLISION = 5.0  # s, cost of a grasp that is not clear
 TOUCH = 1e-3  # m; what overlaps less is clear
-SPREAD = 0.3  # s, beside the best outlook, of which sources are drawn
+SPREAD = 0.3  # s, beside the best prediction, of which sources are drawn
 
 
 class Multiplied:
@@ -58,14 +58,14 @@ class Multiplied:
 
     def __init__(self, path: Path, env: RobotEnv, rng: np.random.Generator) -> None:
         demos = read_demonstrations(path, path.stat().st_mtime_ns)
-        self._cell = workcell(env, rng)
+        self._scene = expert_scene(env, rng)
         hands = len(demos[0].tracks)
-        if len(self._cell.arms) != hands:
+        if len(self._scene.arms) != hands:
             raise DatasetError(
                 f"'{path}' was recorded with {hands} hand(s), but this environment has "
-                f"{len(self._cell.arms)}."
+                f"{len(self._scene.arms)}."
             )
-        self._steps = multiply(self._cell, demos)
+        self._steps = multiply(self._scene, demos)
         self.finished = False
 
     def __call__(self, observation: Mapping[str, Any]) -> Vector:
@@ -75,7 +75,7 @@ class Multiplied:
             next(self._steps)
         except StopIteration:
             self.finished = True
-        return self._cell.action()
+        return self._scene.action()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,7 @@ class Source:
     turn: pin.SE3
 
 
-def multiply(cell: Workcell[Any], demos: Sequence[Demonstration]) -> Steps[None]:
+def multiply(scene: ExpertScene[Any], demos: Sequence[Demonstration]) -> Steps[None]:
     """Do what demonstrations did, each stage as the source that fits the scene best.
 
     Objects are taken in any order in which a demonstration takes them.
@@ -105,10 +105,10 @@ def multiply(cell: Workcell[Any], demos: Sequence[Demonstration]) -> Steps[None]
             for demo in demos
             for start, stop, name in demo.stages
             if name in names
-            for turn in _symmetries(cell, name)
+            for turn in _symmetries(scene, name)
         ]
-        source = _choose(cell, found)
-        if not (yield from _play(cell, source)):
+        source = _choose(scene, found)
+        if not (yield from _play(scene, source)):
             return
         done.append(source.name)
     for _ in range(ENDING):
@@ -122,9 +122,9 @@ def _next_names(demos: Sequence[Demonstration], done: Sequence[str]) -> set[str]
     return {o[k] for o in orders if len(o) > k and sorted(o[:k]) == sorted(done)}
 
 
-def _symmetries(cell: Workcell[Any], name: str) -> list[pin.SE3]:
+def _symmetries(scene: ExpertScene[Any], name: str) -> list[pin.SE3]:
     """Return quarter turns about an object's z axis that keep its grasp sites."""
-    sites = [site.pose for site in cell.grasps(name)] if name else []
+    sites = [site.pose for site in scene.grasps(name)] if name else []
     turns = [pin.SE3(pin.exp3(k * QUARTER), np.zeros(3)) for k in range(4)]
 
     def is_site(pose: pin.SE3) -> bool:
@@ -160,7 +160,7 @@ class Motion:
 
 
 def _motion(
-    cell: Workcell[Any],
+    scene: ExpertScene[Any],
     arm: Arm,
     track: Track,
     segment: Segment,
@@ -173,7 +173,7 @@ def _motion(
     recorded = objects[segment.name]
 
     def pose() -> pin.SE3:
-        return cell.pose(segment.name) * source.turn
+        return scene.pose(segment.name) * source.turn
 
     if not segment.held:
         A = arm.pose * track.hands[at].inverse()
@@ -185,8 +185,8 @@ def _motion(
         return Motion(segment=segment, A=A, B=follow, grip=pin.SE3.Identity)
     A, B = pose() * recorded[at].inverse(), pin.SE3.Identity()
     if segment.onto:
-        lower, before = cell.pose(segment.onto), objects[segment.onto][at].inverse()
-        turns = _symmetries(cell, segment.onto)
+        lower, before = scene.pose(segment.onto), objects[segment.onto][at].inverse()
+        turns = _symmetries(scene, segment.onto)
         ways = [lower * turn * before for turn in turns]
         B = min(
             ways, key=lambda way: np.linalg.norm(pin.log3((A.inverse() * way).rotation))
@@ -195,63 +195,63 @@ def _motion(
     last = [in_source.inverse()]
 
     def grip() -> pin.SE3:
-        if begun and cell.holds(arm, segment.name):
+        if begun and scene.holds(arm, segment.name):
             last[0] = pose().actInv(arm.pose)
         return in_source * last[0]
 
     return Motion(segment=segment, A=A, B=lambda _: B, grip=grip)
 
 
-def _choose(cell: Workcell[Any], found: Sequence[Source]) -> Source:
+def _choose(scene: ExpertScene[Any], found: Sequence[Source]) -> Source:
     """Draw one of the sources whose goals the hands follow about as well as any."""
-    costs = np.array([_cost(cell, each) for each in found])
+    costs = np.array([_cost(scene, each) for each in found])
     good = np.flatnonzero(costs <= costs.min() + SPREAD)
-    return found[int(cell.rng.choice(good))]
+    return found[int(scene.rng.choice(good))]
 
 
-def _cost(cell: Workcell[Any], source: Source) -> float:
-    """Return the cost of the outlooks of all hands along a stage."""
+def _cost(scene: ExpertScene[Any], source: Source) -> float:
+    """Return the cost of the predictions of all hands along a stage."""
     total = 0.0
-    for arm, track in zip(cell.arms, source.demo.tracks, strict=True):
+    for arm, track in zip(scene.arms, source.demo.tracks, strict=True):
         poses: list[pin.SE3] = []
         near: list[tuple[int, str]] = []
         for segment in track.segments:
             if not source.start <= segment.start < source.stop:
                 continue
-            motion = _motion(cell, arm, track, segment, source, begun=False)
+            motion = _motion(scene, arm, track, segment, source, begun=False)
             if not segment.held and not near:
                 near = [(len(poses) + k, segment.name) for k in range(1, len(SAMPLES))]
             goals = track.goals[segment.start : segment.stop]
             for k in np.searchsorted(shares_of_path(goals), SAMPLES):
                 poses.append(motion.pose(goals[k], segment.start + k))
-        outlook = arm.look_ahead(poses)
-        total += outlook.cost
+        prediction = arm.look_ahead(poses)
+        total += prediction.cost
         for k, name in near:
-            q = arm.configuration(outlook.q[k])
-            total += COLLISION * (cell.overlap(arm, q, but=name) > TOUCH)
+            q = arm.configuration(prediction.q[k])
+            total += COLLISION * (scene.overlap(arm, q, but=name) > TOUCH)
     return total
 
 
-def _play(cell: Workcell[Any], source: Source) -> Steps[bool]:
+def _play(scene: ExpertScene[Any], source: Source) -> Steps[bool]:
     """Give the goals of a stage; return whether each object was held where it was."""
     motions: dict[Arm, Motion] = {}
     patience = PATIENCE
     for k in range(source.start, source.stop):
-        for arm, track in zip(cell.arms, source.demo.tracks, strict=True):
+        for arm, track in zip(scene.arms, source.demo.tracks, strict=True):
             segment = next((s for s in track.segments if s.start <= k < s.stop), None)
             if segment is None:  # a hand that holds nothing
                 continue
             if arm not in motions or motions[arm].segment is not segment:
-                if segment.held and not (yield from _held(cell, arm, segment.name)):
+                if segment.held and not (yield from _held(scene, arm, segment.name)):
                     return False
-                motions[arm] = _motion(cell, arm, track, segment, source)
+                motions[arm] = _motion(scene, arm, track, segment, source)
             goal = motions[arm].pose(track.goals[k], k)
             arm.aim(goal, speed=FAST, turn=QUICK, exact=False)
             (arm.close if track.closes[k] else arm.open)()
         yield
         while patience and any(
             _lags(arm, track, k)
-            for arm, track in zip(cell.arms, source.demo.tracks, strict=True)
+            for arm, track in zip(scene.arms, source.demo.tracks, strict=True)
             if arm in motions
         ):
             patience -= 1
@@ -268,10 +268,10 @@ def _lags(arm: Arm, track: Track, k: int) -> bool:
     return far > LAG or turn > LAG_TURN
 
 
-def _held(cell: Workcell[Any], arm: Arm, name: str) -> Steps[bool]:
+def _held(scene: ExpertScene[Any], arm: Arm, name: str) -> Steps[bool]:
     """Wait until fingers hold an object, as long as another hand may need."""
     for _ in range(CLOSING):
-        if cell.holds(arm, name):
+        if scene.holds(arm, name):
             return True
         yield
-    return cell.holds(arm, name)
+    return scene.holds(arm, name)

@@ -6,30 +6,30 @@ import numpy as np
 
 from wbc_suite.benchmark import Reach, Stand, WalkTo
 from wbc_suite.benchmark.walk_to import GOAL
+from wbc_suite.experts.scene import ExpertScene, Steps, wait_until
 from wbc_suite.experts.skills import shifted
 from wbc_suite.experts.walker import walking_velocity
-from wbc_suite.experts.workcell import Steps, Workcell, wait_until
 
-NEAR = 0.05  # m and rad
-MOST = 800  # control periods of one walk
+ARRIVED = 0.05  # m and rad
+LONGEST_WALK = 800  # control periods of one walk
 SETTLE = 40  # control periods to come to rest
 REACHING = 0.3  # m/s
 
 
 def walk(
-    cell: Workcell, x: float, y: float, heading: float, *, near: float = NEAR
+    scene: ExpertScene, x: float, y: float, heading: float, *, near: float = ARRIVED
 ) -> Steps[bool]:
     """Walk to a place in the world, m and rad, and come to rest; return success.
 
     It is reached where less is left than `near`, m and rad.
     Hands that were moved keep their poses relative to the trunk.
     """
-    walker = cell.walker
+    walker = scene.walker
     if walker is None:
         return False
-    held = [(a, walker.ground.actInv(a.goal)) for a in cell.arms if a.goal is not None]
+    held = [(a, walker.ground.actInv(a.goal)) for a in scene.arms if a.goal is not None]
     try:
-        for _ in range(MOST):
+        for _ in range(LONGEST_WALK):
             walker.velocity = walking_velocity(walker.way_to(x, y, heading), near)
             if not walker.velocity.any():
                 return (yield from wait_until(lambda: walker.rests, most=SETTLE))
@@ -41,32 +41,32 @@ def walk(
     return False
 
 
-def walk_to(cell: Workcell[WalkTo]) -> Steps[None]:
+def walk_to(scene: ExpertScene[WalkTo]) -> Steps[None]:
     """Walk to the mark, and turn as its arrow points."""
-    pose = cell.pose(GOAL)
+    pose = scene.pose(GOAL)
     x, y, _ = pose.translation.tolist()
     R = pose.rotation
-    yield from walk(cell, x, y, math.atan2(R[1, 0], R[0, 0]))
+    yield from walk(scene, x, y, math.atan2(R[1, 0], R[0, 0]))
 
 
-def stand(cell: Workcell[Stand]) -> Steps[None]:
+def stand(scene: ExpertScene[Stand]) -> Steps[None]:
     """Withstand the pushes, and return to where the robot stood."""
-    walker = cell.walker
+    walker = scene.walker
     if walker is None:
         return
-    start, last = walker.place, max(push.stop for push in cell.benchmark.pushes)
-    while cell.data.time < last:
+    start, last = walker.place, max(push.stop for push in scene.benchmark.pushes)
+    while scene.data.time < last:
         yield
     while True:
-        if not cell.benchmark.is_back:
-            yield from walk(cell, *start)
+        if not scene.benchmark.is_back:
+            yield from walk(scene, *start)
         yield
 
 
-def reach(cell: Workcell[Reach]) -> Steps[None]:
+def reach(scene: ExpertScene[Reach]) -> Steps[None]:
     """Bring each hand to its target, turned as it was."""
-    targets = dict(zip(cell.benchmark.hands, cell.benchmark.targets, strict=True))
-    for arm in cell.arms:
+    targets = dict(zip(scene.benchmark.hands, scene.benchmark.targets, strict=True))
+    for arm in scene.arms:
         way = targets[arm.hand].position - arm.hand.position
         arm.aim(shifted(arm.pose, way), speed=REACHING)
     yield

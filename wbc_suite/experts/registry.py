@@ -34,6 +34,7 @@ from wbc_suite.experts.loco_lift import loco_lift
 from wbc_suite.experts.nut_assembly import nut_assembly
 from wbc_suite.experts.on_feet import reach, stand, walk_to
 from wbc_suite.experts.pick_place import pick_place
+from wbc_suite.experts.scene import ExpertScene, Steps
 from wbc_suite.experts.stack import stack
 from wbc_suite.experts.tool_hang import tool_hang
 from wbc_suite.experts.two_arm_handover import two_arm_handover
@@ -41,11 +42,10 @@ from wbc_suite.experts.two_arm_lift import two_arm_lift
 from wbc_suite.experts.two_arm_peg_in_hole import two_arm_peg_in_hole
 from wbc_suite.experts.two_arm_transport import two_arm_transport
 from wbc_suite.experts.wipe import wipe
-from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.registry import Registry
 from wbc_suite.typing import Vector
 
-Expert: TypeAlias = Callable[[Workcell[Any]], Steps[None]]
+Expert: TypeAlias = Callable[[ExpertScene[Any]], Steps[None]]
 """Program of a benchmark: it moves arms by skills, one control period per `yield`."""
 
 EXPERTS: Registry[tuple[type, Expert]] = Registry("expert")
@@ -88,13 +88,13 @@ def expert(
         ConfigError: If the action has neither poses of hands nor a walk.
     """
     program, benchmark = find_expert(env.benchmark)
-    cell = Workcell(env, benchmark, rng)
-    steps = program(cell)
+    scene = ExpertScene(env, benchmark, rng)
+    steps = program(scene)
 
     def drive(observation: Mapping[str, Any]) -> Vector:
         del observation
         next(steps, None)
-        return cell.action()
+        return scene.action()
 
     return drive
 

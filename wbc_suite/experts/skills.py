@@ -9,7 +9,7 @@ import pinocchio as pin
 from wbc_suite import logs
 from wbc_suite.experts.arm import SPEED, TURN, Arm
 from wbc_suite.experts.grasp_choice import Approach, Choice, choose_grasp
-from wbc_suite.experts.workcell import Steps, Workcell, wait_until
+from wbc_suite.experts.scene import ExpertScene, Steps, wait_until
 from wbc_suite.typing import Vector
 
 log = logs.logger(__name__)
@@ -20,8 +20,8 @@ PUSHED = 0.01  # m, by which the error rises while a hand is pushed off its way
 PUSHES = 4  # such rises after which a motion starts anew; none for coupled arms
 STOPPED = 2e-4  # rad or m per control period, of fingers
 OPENING = 8  # control periods until a gripper is open
-OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
-FAR = 0.05  # m, error that is told
+OUT_OF_REACH = 0.008  # m, error of predictions; from the start more may be in reach
+TOLD_ERROR = 0.05  # m, error that is told
 PASSING = 0.03  # m, tolerance of poses on the way
 BESIDE, STAYS_BACK = 0.002, 8.0  # m; distance kept for each m beside the way
 ALIGNED = 0.002, 0.02  # m and rad, over an object that may barely fit between fingers
@@ -64,13 +64,15 @@ def move(
     return False
 
 
-def move_in_joints(cell: Workcell, arm: Arm, q: Vector, **options: Any) -> Steps[bool]:
-    """Move a hand as its joints move on a straight line to q, as an outlook has them.
+def move_in_joints(
+    scene: ExpertScene, arm: Arm, q: Vector, **options: Any
+) -> Steps[bool]:
+    """Move a hand as its joints move on a straight line to q, as a prediction has them.
 
     On a straight line in space an arm may end in other joints than the look-ahead, and
     meet their limits. `options` are those of `move`, for the end.
     """
-    for pose in (poses := arm.sweep(q, cell.period)):
+    for pose in (poses := arm.sweep(q, scene.period)):
         arm.aim(pose, speed=2 * SPEED, turn=2 * TURN)
         yield
     return (yield from move(arm, poses[-1], **options))
@@ -113,13 +115,13 @@ def at_height(pose: pin.SE3, height: float) -> pin.SE3:
     return pin.SE3(pose.rotation, np.array([x, y, height]))
 
 
-def settle(cell: Workcell, name: str, *, most: int = 20) -> Steps[bool]:
+def settle(scene: ExpertScene, name: str, *, most: int = 20) -> Steps[bool]:
     """Wait until an object lies still."""
     yield
-    return (yield from wait_until(lambda: cell.speed(name) < 0.02, most=most))
+    return (yield from wait_until(lambda: scene.speed(name) < 0.02, most=most))
 
 
-def grip(cell: Workcell, arm: Arm, name: str, *, most: int = 60) -> Steps[bool]:
+def grip(scene: ExpertScene, arm: Arm, name: str, *, most: int = 60) -> Steps[bool]:
     """Close the gripper until it holds an object; return whether it does.
 
     It ends without success when the fingers have stopped.
@@ -129,12 +131,12 @@ def grip(cell: Workcell, arm: Arm, name: str, *, most: int = 60) -> Steps[bool]:
     fingers = arm.fingers
     for _ in range(most):
         yield
-        held = held + 1 if cell.holds(arm, name) else 0
+        held = held + 1 if scene.holds(arm, name) else 0
         moved = float(np.abs(arm.fingers - fingers).max(initial=0.0))
         still, fingers = still + 1 if moved < STOPPED else 0, arm.fingers
         if held >= 2 or still >= STALLED:
             break
-    return cell.holds(arm, name)
+    return scene.holds(arm, name)
 
 
 def release(arm: Arm, *, back: float = 0.08, steps: int = 5) -> Steps[None]:
@@ -148,7 +150,7 @@ def release(arm: Arm, *, back: float = 0.08, steps: int = 5) -> Steps[None]:
 
 
 def pick(
-    cell: Workcell,
+    scene: ExpertScene,
     name: str,
     *,
     arms: Sequence[Arm] | None = None,
@@ -161,7 +163,7 @@ def pick(
     """Grasp an object and raise it; return how, or None if all tries fail.
 
     Args:
-        cell: The workcell.
+        scene: The scene.
         name: The object.
         arms: The arms that may do it; all by default.
         then: Where it will be carried, see `choose_grasp`.
@@ -170,36 +172,36 @@ def pick(
         tries: How often.
         approach: Fields of `Approach`.
     """
-    way, candidates = Approach(**approach), arms or cell.arms
+    way, candidates = Approach(**approach), arms or scene.arms
 
     def choose() -> Choice | None:
         return choose_grasp(
-            cell, name, arms=candidates, approach=way, then=then, costs=costs
+            scene, name, arms=candidates, approach=way, then=then, costs=costs
         )
 
     for _ in range(tries):
         choice = choose()
-        if choice is not None and choice.outlook.error > OUT_OF_REACH:
+        if choice is not None and choice.prediction.error > OUT_OF_REACH:
             yield from go_home(choice.arm)
             choice = choose()
         if choice is None:
             return None
-        if choice.outlook.error > FAR:
-            short = 1e3 * choice.outlook.error
+        if choice.prediction.error > TOLD_ERROR:
+            short = 1e3 * choice.prediction.error
             log.warning("No hand can reach '%s': it stops %.0f mm short.", name, short)
-        if (yield from take(cell, name, choice, raised=way.raised, over=over)):
+        if (yield from take(scene, name, choice, raised=way.raised, over=over)):
             return choice
         choice.arm.open()
         for _ in range(OPENING):
             yield
         up = shifted(choice.arm.pose, max(way.raised, 0.05) * UP)
         yield from move(choice.arm, up, most=20)
-        yield from settle(cell, name)
+        yield from settle(scene, name)
     return None
 
 
 def take(
-    cell: Workcell,
+    scene: ExpertScene,
     name: str,
     choice: Choice,
     *,
@@ -211,18 +213,18 @@ def take(
     See `pick` for `raised` and `over`.
     """
     arm = choice.arm
-    if not (yield from come_before(cell, choice, over=over)):
+    if not (yield from come_before(scene, choice, over=over)):
         return False
-    yield from close_in(cell, name, choice)
-    if not (yield from grip(cell, arm, name)):
+    yield from close_in(scene, name, choice)
+    if not (yield from grip(scene, arm, name)):
         return False
     if raised > 0.0:
         yield from move(arm, shifted(arm.pose, raised * UP), tolerance=0.02)
-    return cell.holds(arm, name)
+    return scene.holds(arm, name)
 
 
 def close_in(
-    cell: Workcell, name: str, choice: Choice, *, speed: float = SPEED
+    scene: ExpertScene, name: str, choice: Choice, *, speed: float = SPEED
 ) -> Steps[bool]:
     """Bring the open hand to a grasp of an object that may move, at a speed in m/s.
 
@@ -232,7 +234,7 @@ def close_in(
     arm = choice.arm
 
     def goal() -> pin.SE3:
-        return choice.hand_at(cell.pose(name))
+        return choice.hand_at(scene.pose(name))
 
     def behind() -> pin.SE3:
         beside = np.linalg.norm(goal().actInv(arm.pose).translation[:2])
@@ -244,7 +246,7 @@ def close_in(
 
 
 def come_before(
-    cell: Workcell, choice: Choice, *, over: float | None = None
+    scene: ExpertScene, choice: Choice, *, over: float | None = None
 ) -> Steps[bool]:
     """Bring the open hand before a grasp; return whether it got near.
 
@@ -258,7 +260,7 @@ def come_before(
     else:
         arrived = yield from travel(arm, choice.before, height=over, **near)
     if not arrived:
-        arrived = yield from move_in_joints(cell, arm, choice.outlook.q[0], **near)
+        arrived = yield from move_in_joints(scene, arm, choice.prediction.q[0], **near)
     if not arrived and arm.error()[0] > 2 * PASSING:
         return False
     if over is not None:
@@ -268,18 +270,18 @@ def come_before(
 
 
 def put_down(
-    cell: Workcell, arm: Arm, name: str, at: Vector, *, over: float
+    scene: ExpertScene, arm: Arm, name: str, at: Vector, *, over: float
 ) -> Steps[None]:
     """Let go of a held object at a point, the hand pointing down.
 
     Args:
-        cell: The workcell.
+        scene: The scene.
         arm: The arm.
         name: The object.
         at: Where its origin is when it is let go, m.
         over: Height above that at which it is brought there, m.
     """
-    held = cell.pose(name).actInv(arm.pose)
+    held = scene.pose(name).actInv(arm.pose)
     down = np.diag([1.0, -1.0, -1.0])
     best, cost = [], np.inf
     for k in range(8):
@@ -289,13 +291,13 @@ def put_down(
         if found < cost:
             best, cost = poses, found
     above, low = best
-    yield from carry(cell, arm, name, above, tolerance=0.02, turn_tolerance=0.1)
-    yield from carry(cell, arm, name, low, tolerance=0.01, turn_tolerance=0.1)
+    yield from carry(scene, arm, name, above, tolerance=0.02, turn_tolerance=0.1)
+    yield from carry(scene, arm, name, low, tolerance=0.01, turn_tolerance=0.1)
     yield from release(arm, back=over)
 
 
 def follow_arc(
-    cell: Workcell, arm: Arm, joint: str, angle: float, *, speed: float
+    scene: ExpertScene, arm: Arm, joint: str, angle: float, *, speed: float
 ) -> Steps[bool]:
     """Turn a hinge to an angle with the hand that holds what it carries.
 
@@ -303,21 +305,21 @@ def follow_arc(
     most. Returns whether the hinge got there, to 0.02 rad.
 
     Args:
-        cell: The workcell.
+        scene: The scene.
         arm: The arm.
         joint: The hinge.
         angle: The angle, rad.
         speed: Of the hand's goal, rad/s.
     """
-    hinge, index = cell.data.joint(joint), cell.model.joint(joint).id
+    hinge, index = scene.data.joint(joint), scene.model.joint(joint).id
     start, grip = hinge.qpos.item(), arm.pose
-    axis, anchor = cell.data.xaxis[index].copy(), cell.data.xanchor[index].copy()
+    axis, anchor = scene.data.xaxis[index].copy(), scene.data.xanchor[index].copy()
     wanted = start
-    for _ in range(round(abs(angle - start) / (speed * cell.period)) + 30):
+    for _ in range(round(abs(angle - start) / (speed * scene.period)) + 30):
         present = hinge.qpos.item()
         if abs(angle - present) < 0.02:
             return True
-        step = np.clip(angle - wanted, -speed * cell.period, speed * cell.period)
+        step = np.clip(angle - wanted, -speed * scene.period, speed * scene.period)
         if abs(wanted + step - present) < 0.25:
             wanted += step
         R = pin.exp3((wanted - start) * axis)
@@ -327,16 +329,18 @@ def follow_arc(
     return False
 
 
-def turned_about(cell: Workcell, pose: pin.SE3, joint: str, angle: float) -> pin.SE3:
+def turned_about(
+    scene: ExpertScene, pose: pin.SE3, joint: str, angle: float
+) -> pin.SE3:
     """Return a pose turned about a hinge's present axis by an angle, rad."""
-    index = cell.model.joint(joint).id
-    R = pin.exp3(angle * cell.data.xaxis[index])
-    anchor = cell.data.xanchor[index]
+    index = scene.model.joint(joint).id
+    R = pin.exp3(angle * scene.data.xaxis[index])
+    anchor = scene.data.xanchor[index]
     return pin.SE3(R @ pose.rotation, anchor + R @ (pose.translation - anchor))
 
 
 def carry(
-    cell: Workcell,
+    scene: ExpertScene,
     arm: Arm,
     name: str,
     goal: pin.SE3,
@@ -345,6 +349,6 @@ def carry(
     """Bring a held object to a pose; its place in the hand is measured in each step."""
 
     def target() -> pin.SE3:
-        return goal * cell.pose(name).actInv(arm.pose)
+        return goal * scene.pose(name).actInv(arm.pose)
 
     return (yield from move(arm, target, **options))

@@ -6,28 +6,28 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.benchmark.stack import A, B, Stack
+from wbc_suite.experts.scene import ExpertScene, Steps
 from wbc_suite.experts.skills import UP, carry, pick, release, shifted
-from wbc_suite.experts.workcell import Steps, Workcell
 
 QUARTERS = tuple(pin.exp3(k * math.pi / 2 * UP) for k in range(4))
 
 
-def stack(cell: Workcell[Stack]) -> Steps[None]:
+def stack(scene: ExpertScene[Stack]) -> Steps[None]:
     """Put cube A on cube B, its faces parallel to those of B."""
-    config = cell.benchmark.config
+    config = scene.benchmark.config
     height = config.cube_a.half_size + config.cube_b.half_size
     for _ in range(3):
-        on_top = shifted(aligned(cell.pose(A), cell.pose(B)), (height + 0.002) * UP)
+        on_top = shifted(aligned(scene.pose(A), scene.pose(B)), (height + 0.002) * UP)
         ways = [turned(on_top, R) for R in QUARTERS]
         plans = [(shifted(way, 0.06 * UP), way) for way in ways]
-        choice = yield from pick(cell, A, then=plans, raised=0.07)
+        choice = yield from pick(scene, A, then=plans, raised=0.07)
         if choice is None:
             return
         above, goal = choice.then
-        yield from carry(cell, choice.arm, A, above, tolerance=0.008)
-        yield from carry(cell, choice.arm, A, goal, tolerance=0.003, speed=0.15)
+        yield from carry(scene, choice.arm, A, above, tolerance=0.008)
+        yield from carry(scene, choice.arm, A, goal, tolerance=0.003, speed=0.15)
         yield from release(choice.arm)
-        if cell.benchmark.success():
+        if scene.benchmark.success():
             return
 
 

@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from wbc_suite.benchmark.tool_hang import FRAME, STAND, TOOL, ToolHang
 from wbc_suite.experts.arm import Arm
+from wbc_suite.experts.scene import ExpertScene, Steps
 from wbc_suite.experts.skills import (
     UP,
     at_height,
@@ -18,7 +19,6 @@ from wbc_suite.experts.skills import (
     release,
     shifted,
 )
-from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.typing import Vector
 
 YAWS = tuple(k * math.pi / 8 for k in range(16))
@@ -38,66 +38,68 @@ the hole's axis to the upward direction, rad. Between any two points the wrench 
 2.6 mm clear of the hook."""
 
 
-def tool_hang(cell: Workcell[ToolHang]) -> Steps[None]:
+def tool_hang(scene: ExpertScene[ToolHang]) -> Steps[None]:
     """Put the frame into its stand, then a hole of the wrench over its hook."""
     for _ in range(3):
-        if not cell.benchmark.is_inserted():
-            yield from _insert(cell)
-        elif cell.benchmark.success():
+        if not scene.benchmark.is_inserted():
+            yield from _insert(scene)
+        elif scene.benchmark.success():
             return
         else:
-            yield from _hang(cell)
+            yield from _hang(scene)
 
 
-def _over(cell: Workcell[ToolHang]) -> float:
-    return cell.benchmark.config.table.center[2] + OVER
+def _over(scene: ExpertScene[ToolHang]) -> float:
+    return scene.benchmark.config.table.center[2] + OVER
 
 
-def _insert(cell: Workcell[ToolHang]) -> Steps[None]:
+def _insert(scene: ExpertScene[ToolHang]) -> Steps[None]:
     """Stand the frame up in its socket."""
-    arm = cell.arms[0]
-    floor, socket = cell.point(f"{STAND}_floor"), cell.point(f"{STAND}_socket")
-    length = cell.point(f"{FRAME}_corner") - cell.point(f"{FRAME}_tip")
+    arm = scene.arms[0]
+    floor, socket = scene.point(f"{STAND}_floor"), scene.point(f"{STAND}_socket")
+    length = scene.point(f"{FRAME}_corner") - scene.point(f"{FRAME}_tip")
     half = float(np.linalg.norm(length)) / 2
     stands = [pin.SE3(pin.exp3(yaw * UP), floor + half * UP) for yaw in YAWS]
-    costs = _costs_of_hanging(cell, arm, stands)
+    costs = _costs_of_hanging(scene, arm, stands)
     rise = socket[2] - floor[2] + ABOVE
     plans = [(shifted(pose, rise * UP), pose) for pose in stands]
-    choice = yield from pick(cell, FRAME, then=plans, costs=costs, raised=0.25)
+    choice = yield from pick(scene, FRAME, then=plans, costs=costs, raised=0.25)
     if choice is None:
         return
     above, inside = choice.then
-    yield from carry(cell, arm, FRAME, above, tolerance=0.003, turn_tolerance=0.03)
-    yield from carry(cell, arm, FRAME, inside, tolerance=0.006, speed=0.12)
+    yield from carry(scene, arm, FRAME, above, tolerance=0.003, turn_tolerance=0.03)
+    yield from carry(scene, arm, FRAME, inside, tolerance=0.006, speed=0.12)
     yield from release(arm, back=0.12)
-    yield from move(arm, at_height(arm.pose, _over(cell)), tolerance=0.03, most=40)
-    yield from move_in_joints(cell, arm, arm.home_joints, tolerance=0.05, most=40)
+    yield from move(arm, at_height(arm.pose, _over(scene)), tolerance=0.03, most=40)
+    yield from move_in_joints(scene, arm, arm.home_joints, tolerance=0.05, most=40)
 
 
-def _hang(cell: Workcell[ToolHang]) -> Steps[None]:
+def _hang(scene: ExpertScene[ToolHang]) -> Steps[None]:
     """Bring a hole of the wrench over the hook, and let go."""
-    frame = cell.pose(FRAME)
-    plans = [_way(cell, frame, end) for end in (1.0, -1.0)]
-    choice = yield from pick(cell, TOOL, then=plans, raised=RAISED, over=_over(cell))
+    frame = scene.pose(FRAME)
+    plans = [_way(scene, frame, end) for end in (1.0, -1.0)]
+    choice = yield from pick(scene, TOOL, then=plans, raised=RAISED, over=_over(scene))
     if choice is None:
         return
     arm, end = choice.arm, 1.0 if choice.then == plans[0] else -1.0
-    over = choice.outlook.q[-len(WAY)]
-    yield from move_in_joints(cell, arm, over, tolerance=0.03, turn_tolerance=0.2)
+    over = choice.prediction.q[-len(WAY)]
+    yield from move_in_joints(scene, arm, over, tolerance=0.03, turn_tolerance=0.2)
     for k in range(len(WAY)):
-        goal = _way(cell, cell.pose(FRAME), end)[k]
+        goal = _way(scene, scene.pose(FRAME), end)[k]
         yield from carry(
-            cell, arm, TOOL, goal, tolerance=0.0025, speed=0.12, turn=0.3, most=60
+            scene, arm, TOOL, goal, tolerance=0.0025, speed=0.12, turn=0.3, most=60
         )
     yield from release(arm, back=0.15)
     yield from move(arm, shifted(arm.pose, 0.1 * UP), tolerance=0.05, most=30)
 
 
-def _way(cell: Workcell[ToolHang], frame: pin.SE3, end: float) -> tuple[pin.SE3, ...]:
+def _way(
+    scene: ExpertScene[ToolHang], frame: pin.SE3, end: float
+) -> tuple[pin.SE3, ...]:
     """Return the way of the wrench by which the hole at one end gets over the hook."""
-    to_bend, to_hole = _geometry(cell)
+    to_bend, to_hole = _geometry(scene)
     out, up = frame.rotation[:, 0], frame.rotation[:, 2]
-    face = 1.0 if cell.object(TOOL).rotation[2, 2] > -0.5 else -1.0
+    face = 1.0 if scene.object(TOOL).rotation[2, 2] > -0.5 else -1.0
     poses = []
     for outward, upward, angle in WAY:
         normal = math.sin(angle) * out + math.cos(angle) * up
@@ -109,28 +111,28 @@ def _way(cell: Workcell[ToolHang], frame: pin.SE3, end: float) -> tuple[pin.SE3,
     return tuple(poses)
 
 
-def _geometry(cell: Workcell[ToolHang]) -> tuple[Vector, float]:
+def _geometry(scene: ExpertScene[ToolHang]) -> tuple[Vector, float]:
     """Return the hook's bend in the frame, and the distance of a hole, m."""
-    bend = cell.pose(FRAME).actInv(pin.SE3(np.eye(3), cell.point(f"{FRAME}_bend")))
-    holes = cell.point(f"{TOOL}_hole1") - cell.point(f"{TOOL}_hole2")
+    bend = scene.pose(FRAME).actInv(pin.SE3(np.eye(3), scene.point(f"{FRAME}_bend")))
+    holes = scene.point(f"{TOOL}_hole1") - scene.point(f"{TOOL}_hole2")
     return bend.translation, float(np.linalg.norm(holes)) / 2
 
 
 def _costs_of_hanging(
-    cell: Workcell[ToolHang], arm: Arm, frames: Sequence[pin.SE3]
+    scene: ExpertScene[ToolHang], arm: Arm, frames: Sequence[pin.SE3]
 ) -> list[float]:
     """Return the cost of picking the wrench up and hanging it on each pose of a frame.
 
     The least of all grasps from above, and of both ends.
     """
-    tool, costs = cell.pose(TOOL), np.full(len(frames), np.inf)
-    for site in cell.grasps(TOOL):
+    tool, costs = scene.pose(TOOL), np.full(len(frames), np.inf)
+    for site in scene.grasps(TOOL):
         at = tool * site.pose
         if at.rotation[2, 2] > -0.8:
             continue
         picked = arm.look_ahead([at, shifted(at, RAISED * UP)])
         for k, frame in enumerate(frames):
             for end in (1.0, -1.0):
-                way = [pose * site.pose for pose in _way(cell, frame, end)]
+                way = [pose * site.pose for pose in _way(scene, frame, end)]
                 costs[k] = min(costs[k], arm.look_ahead(way, after=picked).cost)
     return costs.tolist()

@@ -2,19 +2,19 @@
 
 from wbc_suite.benchmark.two_arm_handover import HAMMER, TwoArmHandover
 from wbc_suite.experts.handover import hand_over
-from wbc_suite.experts.workcell import Steps, Workcell
+from wbc_suite.experts.scene import ExpertScene, Steps
 
 HEIGHT = 0.35  # m, of the meeting point above the table
 
 
-def two_arm_handover(cell: Workcell[TwoArmHandover]) -> Steps[None]:
+def two_arm_handover(scene: ExpertScene[TwoArmHandover]) -> Steps[None]:
     """Pick the hammer up next to its head, and give its handle's end to arm 1."""
-    giver, taker = cell.arms
+    giver, taker = scene.arms
     yield from hand_over(
-        cell,
+        scene,
         HAMMER,
         giver=giver,
         taker=taker,
         places=("neck", "end"),
-        height=cell.benchmark.config.table.center[2] + HEIGHT,
+        height=scene.benchmark.config.table.center[2] + HEIGHT,
     )

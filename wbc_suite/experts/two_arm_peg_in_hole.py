@@ -8,8 +8,8 @@ import pinocchio as pin
 
 from wbc_suite.benchmark.two_arm_peg_in_hole import PEG, PLATE, TwoArmPegInHole
 from wbc_suite.experts.arm import Arm
+from wbc_suite.experts.scene import ExpertScene, Steps, together
 from wbc_suite.experts.skills import carry, move, shifted
-from wbc_suite.experts.workcell import Steps, Workcell, together
 from wbc_suite.typing import Vector
 
 BEFORE, INSIDE = 0.20, 0.02  # m, of the plate beyond the peg's middle
@@ -19,12 +19,12 @@ ELEVATIONS = (-0.8, -0.4, 0.0)  # rad, of the peg's axis
 HEADINGS = (-0.5, 0.0, 0.5)  # rad, from the direction to the other arm
 
 
-def two_arm_peg_in_hole(cell: Workcell[TwoArmPegInHole]) -> Steps[None]:
+def two_arm_peg_in_hole(scene: ExpertScene[TwoArmPegInHole]) -> Steps[None]:
     """Hold the plate where both arms reach, and put the peg through."""
-    peg_arm, plate_arm = cell.arms
-    peg, plate = cell.pose(PEG), cell.pose(PLATE)
+    peg_arm, plate_arm = scene.arms
+    peg, plate = scene.pose(PEG), scene.pose(PLATE)
     middle = (peg.translation + plate.translation) / 2
-    before, target = _meeting(cell, middle)
+    before, target = _meeting(scene, middle)
     apart = peg_arm.pose.translation - plate_arm.pose.translation
     away = ASIDE * apart / max(float(np.linalg.norm(apart)), 1e-6)
     yield from together(
@@ -32,23 +32,23 @@ def two_arm_peg_in_hole(cell: Workcell[TwoArmPegInHole]) -> Steps[None]:
         move(plate_arm, shifted(plate_arm.pose, -away), tolerance=0.03, most=12),
     )
     yield from together(
-        carry(cell, peg_arm, PEG, before, tolerance=0.01),
-        carry(cell, plate_arm, PLATE, target, tolerance=0.01),
+        carry(scene, peg_arm, PEG, before, tolerance=0.01),
+        carry(scene, plate_arm, PLATE, target, tolerance=0.01),
     )
     relative = target.actInv(before)
     for depth in (BEFORE, INSIDE):
-        goal = cell.pose(PLATE) * relative
+        goal = scene.pose(PLATE) * relative
         axis = goal.rotation[:, 2]
-        hole = cell.pose(PLATE).translation
+        hole = scene.pose(PLATE).translation
         inside = pin.SE3(goal.rotation, hole - depth * axis)
-        yield from carry(cell, peg_arm, PEG, inside, tolerance=0.005, speed=0.3)
+        yield from carry(scene, peg_arm, PEG, inside, tolerance=0.005, speed=0.3)
 
 
 def _meeting(
-    cell: Workcell[TwoArmPegInHole], middle: Vector
+    scene: ExpertScene[TwoArmPegInHole], middle: Vector
 ) -> tuple[pin.SE3, pin.SE3]:
     """Return poses of the peg, before the hole, and of the plate, that suit both."""
-    peg_arm, plate_arm = cell.arms
+    peg_arm, plate_arm = scene.arms
     across = plate_arm.pose.translation - peg_arm.pose.translation
     heading = math.atan2(across[1], across[0])
     best, found = math.inf, None
@@ -57,8 +57,8 @@ def _meeting(
         axis = np.array([c * math.cos(rise), s * math.cos(rise), math.sin(rise)])
         pegs = [pin.SE3(_along(axis, roll), middle) for roll in ROLLS]
         plates = [pin.SE3(_along(-axis, roll), middle) for roll in ROLLS]
-        cost, peg = _easiest(cell, peg_arm, PEG, pegs, (-BEFORE * axis, 0.0 * axis))
-        other, plate = _easiest(cell, plate_arm, PLATE, plates, (0.0 * axis,))
+        cost, peg = _easiest(scene, peg_arm, PEG, pegs, (-BEFORE * axis, 0.0 * axis))
+        other, plate = _easiest(scene, plate_arm, PLATE, plates, (0.0 * axis,))
         if cost + other < best:
             best, found = cost + other, (shifted(peg, -BEFORE * axis), plate)
     assert found is not None
@@ -66,14 +66,14 @@ def _meeting(
 
 
 def _easiest(
-    cell: Workcell[TwoArmPegInHole],
+    scene: ExpertScene[TwoArmPegInHole],
     arm: Arm,
     name: str,
     poses: list[pin.SE3],
     offsets: tuple[Vector, ...],
 ) -> tuple[float, pin.SE3]:
     """Return the pose of a fixed object that its arm reaches best, with its cost."""
-    held = cell.pose(name).actInv(arm.pose)
+    held = scene.pose(name).actInv(arm.pose)
     costs = [
         arm.look_ahead([shifted(pose, o) * held for o in offsets]).cost
         for pose in poses

@@ -6,16 +6,16 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.experts.arm import Arm
+from wbc_suite.experts.scene import ExpertScene, Steps
 from wbc_suite.experts.skills import UP, shifted
-from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.typing import Vector
 
 RAISED = 0.08  # m, of hands while a base drives
-MOST = 100  # control periods
+LONGEST_WAIT = 100  # control periods
 
 
 def carry_together(
-    cell: Workcell,
+    scene: ExpertScene,
     arms: Sequence[Arm],
     name: str,
     goal: pin.SE3,
@@ -28,12 +28,12 @@ def carry_together(
 
     Speeds in m/s and rad/s. Returns whether the object got within the tolerance, m.
     """
-    start = cell.pose(name)
+    start = scene.pose(name)
     grips = [start.actInv(arm.pose) for arm in arms]
     shift = goal.translation - start.translation
     angle = pin.log3(goal.rotation @ start.rotation.T)
     far = max(float(np.linalg.norm(shift)) / speed, float(np.linalg.norm(angle)) / turn)
-    periods = max(1, round(far / cell.period))
+    periods = max(1, round(far / scene.period))
     for k in range(periods + 20):
         share = min(1.0, (k + 1) / periods)
         R = pin.exp3(share * angle) @ start.rotation
@@ -41,38 +41,38 @@ def carry_together(
         for arm, grip in zip(arms, grips, strict=True):
             arm.aim(wanted * grip)
         yield
-        left = goal.translation - cell.pose(name).translation
+        left = goal.translation - scene.pose(name).translation
         if np.linalg.norm(left) < tolerance:
             return True
     return False
 
 
 def drive_before(
-    cell: Workcell, name: str, arms: Sequence[Arm], sites: Sequence[str]
+    scene: ExpertScene, name: str, arms: Sequence[Arm], sites: Sequence[str]
 ) -> Steps[bool]:
     """Drive a base to where two hands reach an object; return whether it arrived.
 
     Does nothing for robots without. Hands keep their poses in the base, but raised.
 
     Args:
-        cell: The workcell.
+        scene: The scene.
         name: The object.
         arms: The right and the left arm.
         sites: Where each will grasp the object.
     """
-    base = cell.base(arms[0].state)
+    base = scene.base(arms[0].state)
     if base is None:
         return True
-    right, left = map(cell.point, sites)
+    right, left = map(scene.point, sites)
 
     def free(q: Vector) -> bool:
-        return cell.overlap(arms[0], q, but=name) == 0.0
+        return scene.overlap(arms[0], q, but=name) == 0.0
 
-    base.go_before(cell.pose(name).translation, left - right, free)
+    base.go_before(scene.pose(name).translation, left - right, free)
     held = [base.pose.actInv(shifted(arm.pose, RAISED * UP)) for arm in arms]
     for arm in arms:
         arm.keep_base()
-    for _ in range(MOST):
+    for _ in range(LONGEST_WAIT):
         for arm, grip in zip(arms, held, strict=True):
             arm.aim(base.pose * grip)
         yield

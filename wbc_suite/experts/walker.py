@@ -12,7 +12,7 @@ from wbc_suite.envs import RobotEnv
 from wbc_suite.typing import Vector
 
 FASTEST = np.array([0.5, 0.3, 0.5])  # m/s, m/s, rad/s: every gait sustains them
-FAR = 0.6  # m; from here on the robot looks where it walks
+LOOKS_AHEAD_FROM = 0.6  # m; from here on the robot looks where it walks
 ASIDE = 0.5  # rad; it turns on the spot towards what is farther aside
 
 
@@ -73,7 +73,7 @@ def walking_velocity(way: Vector, near: float) -> Vector:
     forward, left, turn = way
     if max(math.hypot(forward, left), abs(turn)) < near:
         return np.zeros(3)
-    if math.hypot(forward, left) > FAR:
+    if math.hypot(forward, left) > LOOKS_AHEAD_FROM:
         turn = math.atan2(left, forward)
         if abs(turn) > ASIDE:
             forward = left = 0.0

@@ -7,8 +7,8 @@ import pinocchio as pin
 
 from wbc_suite.benchmark.wipe import Wipe
 from wbc_suite.experts.arm import Arm
+from wbc_suite.experts.scene import ExpertScene, Steps
 from wbc_suite.experts.skills import UP, move
-from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.typing import Vector
 
 FORCE = 20.0  # N; below 60 N nothing is subtracted from the reward
@@ -19,19 +19,19 @@ SLIDING = 0.3  # m/s
 TURNS = tuple(k * math.pi / 4 for k in range(8))
 
 
-def wipe(cell: Workcell[Wipe]) -> Steps[None]:
+def wipe(scene: ExpertScene[Wipe]) -> Steps[None]:
     """Press the pad on the table, and slide it over the nearest mark that is left."""
-    arm, marks = cell.arms[0], cell.benchmark.marks
+    arm, marks = scene.arms[0], scene.benchmark.marks
     flat = _rotation(arm, [marks[0], marks[-1], marks.mean(axis=0)])
     distances = [np.linalg.norm(arm.pose.translation - marks[k]) for k in (0, -1)]
     start = marks[-int(np.argmin(distances))]
     yield from move(arm, pin.SE3(flat, start + ABOVE * UP), tolerance=0.02)
     depth = 0.0
-    while not cell.benchmark.success():
-        left = marks[~cell.benchmark.wiped]
+    while not scene.benchmark.success():
+        left = marks[~scene.benchmark.wiped]
         at = arm.pose.translation
         target = left[np.argmin(np.linalg.norm(left[:, :2] - at[:2], axis=1))]
-        error = FORCE - cell.benchmark.force
+        error = FORCE - scene.benchmark.force
         depth = float(np.clip(depth + SOFT * error, 0.0, DEEPEST))
         goal = pin.SE3(flat, target - depth * UP)
         arm.aim(goal, speed=SLIDING, exact=False)

@@ -28,7 +28,7 @@ from wbc_suite.qp.dynamics_space import (
     MomentumTask,
     Rows,
 )
-from wbc_suite.qp.fallback import checked_solve, retreat
+from wbc_suite.qp.fallback import checked_solve, solve_relaxed
 from wbc_suite.qp.lie import saturate
 from wbc_suite.qp.limit import (
     BoxLimit,
@@ -59,7 +59,7 @@ class DynamicsSolution(NamedTuple):
         a: Accelerations, shape (nv,).
         tau: Torques of the actuated joints, N m or N, shape (nv,) or (nv - 6,).
         forces: Force at each point of each contact, world axes, N, shape (k, 3).
-        fallback: How far the tick had to retreat.
+        fallback: Which easier problem was solved.
         residual: By how much the worst bound or torque limit is violated.
         missing: What each task lacks of the acceleration that it asks for, (dim,).
     """
@@ -278,7 +278,7 @@ class DynamicsStack:
                 worst = max(worst, Fallback.LEVEL)
                 continue
             if result is None:
-                *result, fallback = retreat(stated)
+                *result, fallback = solve_relaxed(stated)
             y, worst = result[0], max(worst, fallback)
             if level < levels[-1]:
                 kept = _row_space(np.concatenate([kept, J]))

@@ -1,9 +1,9 @@
 """How a tick is solved where its active set is not found, or has no solution.
 
 A solver runs first, and daqp where it gives up. Where the first level has no solution,
-a ladder is descended, mildest rung first: relax inequality rows with slack; relax
+easier problems are tried, the mildest first: relax inequality rows with slack; relax
 equality rows too; damped least squares within the joints' bounds; stand still. The
-bounds of joints are kept on every rung, with the acceleration window: rows that nearly
+bounds of joints are kept in all of them, with the acceleration window: rows that nearly
 depend on each other have solutions of any speed, and without the window a robot that
 was to keep them was measured to jump by 37 rad/s in each tick.
 """
@@ -26,7 +26,7 @@ _SWEEPS = 100
 _ROOM = 1e-11  # m or rad; so much wider are bounds that rounding may make infeasible
 
 
-class Ladder:
+class LevelSolver:
     """Solves the levels of a stack one by one, by a solver or a fallback.
 
     The levels are as `solve_tick` has stated them at the positions q. The solver is for
@@ -70,7 +70,7 @@ class Ladder:
             problem.weight = RETURN_WEIGHT * stiffness(level.arrays.tasks)
             if is_finite:
                 damping = float(self._overshoot_damping[0])
-                *result, fallback = retreat(problem, damping=damping)
+                *result, fallback = solve_relaxed(problem, damping=damping)
             else:
                 lb, ub = self._bounds_without_acceleration(dt)
                 still = np.clip(np.zeros(problem.nv), lb, ub)
@@ -135,12 +135,12 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
     return x, multipliers
 
 
-def retreat(
+def solve_relaxed(
     problem: Problem, *, damping: float = 0.0
 ) -> tuple[Vector, Vector, Fallback]:
-    """Return step, multipliers and rung for a problem that has no solution.
+    """Return step, multipliers and fallback for a problem that has no solution.
 
-    Daqp solves the rungs, whichever solver failed: others take milliseconds for each.
+    Daqp solves them, whichever solver failed: others take milliseconds for each.
     `damping` is added to that of relaxed rows, m^2/rad^2; see `overshoot`.
     """
     if result := checked_solve(DaqpSolver(), _loosened(problem.copy())):

@@ -6,7 +6,9 @@ from wbc_suite.compiling import compiled, inner
 from wbc_suite.linear_algebra import dot
 from wbc_suite.typing import Matrix, Vector
 
-FAR = 1e9  # m or rad; a target beyond it counts as not finite: squares may overflow
+LARGEST_FINITE = (
+    1e9  # m or rad; a target beyond it counts as not finite: squares may overflow
+)
 _SMALL_ANGLE = 1e-4  # below it series are exact to 1e-16
 
 
@@ -77,9 +79,11 @@ def _write_series(
 
 
 def is_usable(target: Vector) -> bool:
-    """Return whether all values are finite and nearer than FAR."""
+    """Return whether all values are finite and nearer than LARGEST_FINITE."""
     values = target.ravel().tolist()  # a dozen: three times as fast as NumPy's calls
-    return all(-FAR < value < FAR for value in values)  # NaN compares false
+    return all(
+        -LARGEST_FINITE < value < LARGEST_FINITE for value in values
+    )  # NaN compares false
 
 
 @inner

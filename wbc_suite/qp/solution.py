@@ -11,7 +11,7 @@ from wbc_suite.typing import Vector
 
 
 class Fallback(IntEnum):
-    """How far a tick had to retreat from the problem as stated, mildest first.
+    """Which easier problem a tick had to solve, mildest first.
 
     `str` says what was done: limit rows were relaxed, and so on.
     """
@@ -50,7 +50,7 @@ class Solution(NamedTuple):
     Attributes:
         dq: Step in the tangent space, shape (nv,); integrate it, never add it to q.
         v: Velocity `dq / dt`, shape (nv,).
-        fallback: How far the tick had to retreat.
+        fallback: Which easier problem was solved.
         residual: By how much the worst kept constraint is violated, in its own unit.
         held: Tasks whose target was not finite; what they control stands still.
         conflicts: Names of the equality rows and limits that could not be kept.

@@ -13,7 +13,7 @@ from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.constraints import Constraints, check_parts
 from wbc_suite.qp.equality import Equality
 from wbc_suite.qp.escape import Escape
-from wbc_suite.qp.fallback import Ladder
+from wbc_suite.qp.fallback import LevelSolver
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
 from wbc_suite.qp.kernel import Kernel, log_python_parts
@@ -134,7 +134,9 @@ class TaskStack:
         self._tick = self._make_arrays(results)
         self.v_previous: Vector = self._tick.v
         past = self._overshoot.damping
-        self._ladder = Ladder(configuration.q, self.levels, self._tick, qp, past)
+        self._level_solver = LevelSolver(
+            configuration.q, self.levels, self._tick, qp, past
+        )
         self.arrays = as_argument(self._tick)
         frames = [t for t in tasks if isinstance(t, FrameTask)]
         self._escape: Escape | None = None
@@ -199,7 +201,7 @@ class TaskStack:
         """
         what, shape = "TaskStack.reset: v", self.v_previous.shape
         self.v_previous[:] = 0.0 if v is None else check_array(what, v, shape)
-        for part in (self._ladder, *self.levels, self._constraints, self._escape):
+        for part in (self._level_solver, *self.levels, self._constraints, self._escape):
             if part is not None:
                 part.reset()
         self._tick.pressure_damping[:] = 0.0
@@ -261,7 +263,7 @@ class TaskStack:
                 fallback = Fallback.HOLD
                 break
             is_finite = status != TickStatus.BAD_ROWS
-            result = self._ladder.solve_level(k, dt, is_finite=is_finite)
+            result = self._level_solver.solve_level(k, dt, is_finite=is_finite)
             fallback = max(fallback, result)
             if result is not Fallback.LEVEL:
                 finish_level(self.arrays, k, dt, result is Fallback.NONE)
@@ -276,7 +278,7 @@ class TaskStack:
 
         Rows outside their limit are soft, see `Problem`.
         """
-        problem, _ = self._ladder.problem(0)
+        problem, _ = self._level_solver.problem(0)
         self.levels[0].state(problem)
         return problem
 

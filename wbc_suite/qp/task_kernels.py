@@ -18,7 +18,7 @@ from wbc_suite.kinematics.forward import (
 )
 from wbc_suite.linear_algebra import copy_rows
 from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.lie import FAR, inverse_left_jacobian, log3
+from wbc_suite.qp.lie import LARGEST_FINITE, inverse_left_jacobian, log3
 from wbc_suite.typing import Indices, Matrix, Vector
 
 
@@ -140,7 +140,7 @@ def relative_rotation(T: Vector, target: Vector, out: Matrix) -> bool:
     """
     finite = True
     for i in range(12):
-        finite &= abs(target[i]) < FAR
+        finite &= abs(target[i]) < LARGEST_FINITE
     for i in range(3):
         for j in range(3):
             out[i, j] = 1.0 if i == j else 0.0
@@ -189,7 +189,7 @@ def _weigh_rows(
             square += errors[row] ** 2
         length, limit = np.sqrt(square), max_speed[t, part] * dt
         distances[t, part] = length
-        finite &= length < FAR
+        finite &= length < LARGEST_FINITE
         scale[part] = gain if gain * length <= limit else limit / length
     if not finite:
         distances[t, 0] = distances[t, 1] = np.nan

@@ -132,7 +132,7 @@ def bind_kernels(
     tasks, qp, n = first.tasks, first.qp, 1
     matrix, vector = np.zeros((n, n)), np.zeros(n)
 
-    def rows_of(kernel: Any, arrays: Any, is_used: bool) -> Any:
+    def rows_of(kernel: Any, arrays: Any, is_used: bool | np.bool) -> Any:
         used = kernel if is_used else no_rows
         return by_address(used, robot, arrays, 0.0, matrix, vector)
 

@@ -12,12 +12,12 @@ from wbc_suite.typing import Vector
 
 WIDTH, HEIGHT, MARGIN = 720, 150, 28  # pixels of one plot
 INK, CURVE, GOOD, BAD = "#333333", "#4a6fa5", "#3f8f5b", "#c8553d"
-MOST = 400  # episodes and points that are drawn at most
+MOST_DRAWN = 400  # episodes and points that are drawn at most
 
 
 def write_plots(dataset: Dataset, path: Path) -> None:
     """Draw lengths by episode, and how actions and rewards spread."""
-    names = dataset.names[:MOST]
+    names = dataset.names[:MOST_DRAWN]
     if not names:
         raise DatasetError(f"'{dataset.path}' has no episodes to plot.")
     lengths = np.array([dataset.length(name) for name in names], dtype=np.float64)
@@ -29,7 +29,7 @@ def write_plots(dataset: Dataset, path: Path) -> None:
     _bars(pen, 0, "Actions per episode (green: success)", lengths, colours)
     spread = actions.std(axis=0)
     _bars(pen, 1, "Spread of each action", spread, [CURVE] * len(spread))
-    sizes = np.linalg.norm(actions[:: len(actions) // MOST + 1], axis=1)
+    sizes = np.linalg.norm(actions[:: len(actions) // MOST_DRAWN + 1], axis=1)
     _bars(pen, 2, "Size of the action over time", sizes, [CURVE] * len(sizes))
     save_picture(sheet, path)
 

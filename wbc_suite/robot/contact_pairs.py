@@ -18,7 +18,7 @@ from wbc_suite.robot.shapes import Capsule, Shape, Sphere
 LOG = logs.logger(__name__)
 
 OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
-NEAR = 0.01  # m; links that never come nearer never touch
+NEVER_NEARER = 0.01  # m; links that never come nearer never touch
 POSTURES = 2000
 MAX_OVERLAP_SHARE, MAX_FALSE_SHARE = 0.25, 0.2
 """Shares of random postures: in which shapes overlap, and in which capsules do while
@@ -42,7 +42,7 @@ def exclude_by_sampling(robot: RobotDescription, source: Path) -> RobotDescripti
     simulator leaves out such a pair as well: an arm that touches itself where its
     controller does not expect it sticks there.
     """
-    near, overlap = _sampled_contacts(robot, NEAR, -OVERLAP)
+    near, overlap = _sampled_contacts(robot, NEVER_NEARER, -OVERLAP)
     (capsules,) = _sampled_contacts(_of_capsules(robot), -OVERLAP)
     excluded = {*map(frozenset, robot.contacts.exclude)}
     solid = sorted(link.name for link in robot.links if link.collision)

@@ -16,7 +16,7 @@ from wbc_suite.typing import Matrix
 FLAT = 0.004
 """m; what lies at most so much higher than the lowest point belongs to the sole."""
 
-UPRIGHT, AHEAD = 0.98, 0.7
+UPRIGHT_COSINE, AHEAD_COSINE = 0.98, 0.7
 """Least cosines of z to up and of x to ahead of a sole that is taken as given."""
 BIPED = 2  # feet at most; those of others are points
 
@@ -79,7 +79,7 @@ def level_soles(
     frames = {frame.name: frame for frame in robot.frames}
     for frame in feet:
         rotation = to_world @ data.oMf[model.getFrameId(frame.name)].rotation
-        if rotation[2, 2] > UPRIGHT and rotation[0, 0] > AHEAD:
+        if rotation[2, 2] > UPRIGHT_COSINE and rotation[0, 0] > AHEAD_COSINE:
             continue
         fields = pose_fields(se3_of(frame) * pin.SE3(rotation.T, np.zeros(3)))
         name = frame.name

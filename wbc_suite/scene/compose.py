@@ -23,7 +23,7 @@ LANDED = 0.005  # distance of free feet from the floor that is left as it is, m
 
 ROBOT_VIEW = "robotview"
 """Name of the camera behind each robot, after the robot's prefix."""
-BEHIND, ABOVE, AHEAD = 0.4, 0.5, 0.2
+CAMERA_BEHIND, CAMERA_ABOVE, LOOKED_AHEAD = 0.4, 0.5, 0.2
 """Distance of that camera behind and above the robot at rest, and of its target in
 front of the robot, m."""
 
@@ -180,8 +180,8 @@ def aim_robot_view(state: RobotState) -> None:
     yaw = np.arctan2(base.rotation[1, 0], base.rotation[0, 0])
     upright = pin.SE3(pin.utils.rotate("z", yaw), base.translation)
     low, high = _extent(state, upright)
-    eye = np.array([low[0] - BEHIND, 0.0, high[2] + ABOVE])
-    target = np.array([high[0] + AHEAD, 0.0, low[2] + 0.6 * (high[2] - low[2])])
+    eye = np.array([low[0] - CAMERA_BEHIND, 0.0, high[2] + CAMERA_ABOVE])
+    target = np.array([high[0] + LOOKED_AHEAD, 0.0, low[2] + 0.6 * (high[2] - low[2])])
     pose = pose_fields(base.inverse() * upright * _looking_at(eye, target))
     camera = model.camera(state.prefix + ROBOT_VIEW).id
     model.cam_pos[camera], model.cam_quat[camera] = pose["pos"], pose["quat"]

@@ -44,7 +44,7 @@ PREFIX = "arena_"
 """Text before every name of the file in the composed scene."""
 OWN = "own"
 ON_SITES = int(mujoco.mjtTrn.mjTRN_SITE), int(mujoco.mjtTrn.mjTRN_SLIDERCRANK)
-NEAR = 0.25
+NEAR_EDGE = 0.25
 """Distance of the benchmark's origin from the front edge of a surface, at most, m:
 pedestals, whose feet reach under tables, then stand before a cupboard."""
 FLAT = 0.01  # height of a top that is a floor, m
@@ -84,7 +84,7 @@ class ArenaConfig(FrozenModel):
         side = self._side(m, data, top)
         heading, depth, width = top.from_side(side)
         size = (
-            min(depth, 2 * NEAR, table.size[0]),
+            min(depth, 2 * NEAR_EDGE, table.size[0]),
             min(width, table.size[1]),
             table.size[2],
         )

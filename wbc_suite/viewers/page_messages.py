@@ -10,9 +10,11 @@ from typing import Annotated, Literal, TypeAlias
 import msgspec
 
 MAX_BYTES = 16_384  # of a message; a browser sends less than 1 kB
-FAR = 1e6  # greatest absolute value, in any unit
+LARGEST_NUMBER = 1e6  # greatest absolute value, in any unit
 
-Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-FAR, le=FAR)]
+Number: TypeAlias = Annotated[
+    float, msgspec.Meta(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)
+]
 Text: TypeAlias = Annotated[
     str, msgspec.Meta(max_length=256, pattern=r"\A[^\x00-\x1f\x7f-\x9f]*\Z")
 ]

@@ -15,7 +15,7 @@ from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 if TYPE_CHECKING:
     import viser
 
-NEAR = 0.012  # m; a copy nearer than this to its limb would only tint it
+LEAST_MARKED = 0.012  # m; a copy nearer than this to its limb would only tint it
 TURNED = 0.12  # rad
 ABOVE = np.array([0.0, 0.0, 0.12])  # m, from the target to its label
 BALL = 0.04  # m, radius of the marker of a frame without geoms
@@ -63,7 +63,7 @@ class TargetMarkers:
         """Move the markers; `notes` are the labels of limbs, possibly empty."""
         for name, status in snapshot.limbs.items():
             node, line, label = self._markers[name]
-            line.visible = status.position_error > NEAR
+            line.visible = status.position_error > LEAST_MARKED
             node.visible = line.visible or status.orientation_error > TURNED
             if node.visible:
                 place(node, status.target)

@@ -14,7 +14,7 @@ from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Matrix, Vector
 from wbc_suite.wrappers.flat import Flat, Flattened
 
-NEAR = {Lift: 0.05, Stack: 0.02, PickPlace: 0.05, Reach: 0.02}
+REACHED_WITHIN = {Lift: 0.05, Stack: 0.02, PickPlace: 0.05, Reach: 0.02}
 """Distance of a point from its goal that counts as reached, m."""
 LIFTED = np.array([[-0.1, -0.1, 0.04], [0.1, 0.1, 0.2]])
 """Corners of the box of Lift's goals, from the middle of the table's top, m."""
@@ -28,7 +28,7 @@ class Goals(gymnasium.Wrapper[GoalObservation, Any, Flattened, Flattened]):
     A goal is a place of each point, m: of the cube in the air (Lift), of the red cube
     on the green one (Stack), of the groceries of the episode in their quadrants
     (PickPlace), of the hands at their targets (Reach). It is drawn or read at a reset.
-    The reward is 0 where all points are within `NEAR` of their places, and -1
+    The reward is 0 where all points are within `REACHED_WITHIN` of their places, and -1
     elsewhere. `info["is_success"]` says so too, `info["success"]` is the benchmark's.
 
     Source of the interface: Plappert et al. (2018), arXiv:1802.09464.
@@ -38,13 +38,13 @@ class Goals(gymnasium.Wrapper[GoalObservation, Any, Flattened, Flattened]):
         flat: Any = Flat(env)  # the type of its observations is what changes here
         super().__init__(flat)
         self._benchmark: Benchmark = env.unwrapped.benchmark  # pyright: ignore[reportAttributeAccessIssue] - ours
-        kinds = [kind for kind in NEAR if isinstance(self._benchmark, kind)]
+        kinds = [kind for kind in REACHED_WITHIN if isinstance(self._benchmark, kind)]
         if not kinds:
             raise ConfigError(
                 f"{self._benchmark.name} has no goals; those that have: "
-                f"{', '.join(kind.__name__ for kind in NEAR)}."
+                f"{', '.join(kind.__name__ for kind in REACHED_WITHIN)}."
             )
-        self.near = NEAR[kinds[0]]
+        self.near = REACHED_WITHIN[kinds[0]]
         self._points: Sequence[Vector]
         self._points, self._desired = _goal(self._benchmark, np.random.default_rng(0))
         anywhere = gymnasium.spaces.Box(

@@ -29,6 +29,7 @@ from wbc_suite.control.part.base_velocity import (
     BaseVelocityConfig,
     BaseVelocityController,
 )
+from wbc_suite.control.part.controller import UNTIL_NEXT_ACTION
 from wbc_suite.control.part.gripper import GripperController
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
@@ -37,9 +38,6 @@ from wbc_suite.locomotion import GAITS, TrotConfig, begin_gait, make_gait
 from wbc_suite.locomotion.gait import Mode
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.typing import Indices, Vector
-
-UNTIL_NEXT_ACTION = 1_000_000
-"""Physics steps; the loop needs no Python."""
 
 BASE_WEIGHT = 100.0
 """Of the accelerations of a base, above those of hands: it drives as commanded."""

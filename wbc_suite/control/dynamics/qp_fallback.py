@@ -3,7 +3,7 @@
 import numpy as np
 
 from wbc_suite.qp.active_set import QpArrays
-from wbc_suite.qp.fallback import checked_solve, retreat
+from wbc_suite.qp.fallback import checked_solve, solve_relaxed
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.qp.solver import make_solver
@@ -13,7 +13,7 @@ SOFT = 1e4
 
 
 class QpFallback:
-    """Solves by daqp, and else descends the ladder of the stack.
+    """Solves by daqp, and else tries the easier problems of the stack.
 
     Args:
         qp: The arrays, for their sizes.
@@ -33,6 +33,6 @@ class QpFallback:
         result, fallback = checked_solve(self._solver, problem), Fallback.NONE
         if result is None:
             problem.weight = SOFT
-            *result, fallback = retreat(problem)
+            *result, fallback = solve_relaxed(problem)
         qp.x[:] = result[0]
         return fallback

@@ -33,7 +33,7 @@ STRONGEST_CHANGE = 200.0
 HEAVIEST, HEAVIEST_MOMENT = 120.0, 8.0
 """N and N m; greatest load."""
 
-AT_STOP, AHEAD = 0.01, 0.1
+AT_STOP, STOP_HORIZON = 0.01, 0.1
 """rad or m, and s; where a joint is so near to its limit now or after this time, its
 stop may act, and estimated loads fade: they would push it on."""
 
@@ -178,7 +178,7 @@ def _is_at_stop(physics: Physics, body: WholeBodyDynamics, k: int) -> bool:
     low, high, at_stop = body.limits[0], body.limits[1], False
     for j in range(body.qpos.shape[0]):
         q = physics.qpos[body.qpos[j]]
-        ahead = q + AHEAD * physics.qvel[body.dofs[6 + j]]
+        ahead = q + STOP_HORIZON * physics.qvel[body.dofs[6 + j]]
         outside = min(q, ahead) < low[j] + AT_STOP or max(q, ahead) > high[j] - AT_STOP
         at_stop = at_stop or (outside and body.is_arm[k, j] == 1)
     return at_stop

@@ -26,7 +26,7 @@ from wbc_suite.robot.elements import Synergy
 from wbc_suite.typing import Matrix, Vector
 
 TOUCH = 0.02  # m; tips of a tracked hand, inside the fingers, that touch each other
-NEAR = 0.06  # m; distance of tips below which it counts
+PINCH_BEGINS = 0.06  # m; distance of tips below which it counts
 FINGER_WEIGHT, THUMB_WEIGHT = 1.0, 0.3
 PINCH_WEIGHT = 60.0  # of touching tips
 PRIOR = 0.004  # m; an error in position that counts as a synergy's whole half range
@@ -114,8 +114,10 @@ class FingertipRetargeting:
         for finger in self._others:
             apart = joints[FINGERS[finger][-1]] - joints[FINGERS["thumb"][-1]]
             distance = float(np.linalg.norm(apart))
-            closeness = np.clip((NEAR - distance) / (NEAR - TOUCH), 0.0, 1.0)
-            stretch = NEAR / (NEAR - TOUCH) * max(distance - TOUCH, 0.0)
+            closeness = np.clip(
+                (PINCH_BEGINS - distance) / (PINCH_BEGINS - TOUCH), 0.0, 1.0
+            )
+            stretch = PINCH_BEGINS / (PINCH_BEGINS - TOUCH) * max(distance - TOUCH, 0.0)
             vectors.append(stretch / max(distance, 1e-9) * (R.T @ apart))
             weights.append(PINCH_WEIGHT * closeness**2)
         return np.array(vectors), np.array(weights)

@@ -11,7 +11,7 @@ from wbc_suite.devices.pipeline.one_euro import OneEuroFilter
 from wbc_suite.devices.state import LimbInput
 from wbc_suite.typing import Vector
 
-NEAR = 1e-9  # m or rad
+ROUNDING = 1e-9  # m or rad
 
 
 class LimbPipeline:
@@ -152,7 +152,7 @@ def clip_to_box(target: pin.SE3, box: WorkspaceBox) -> tuple[pin.SE3, bool]:
     """Return the nearest target inside a box, and whether it is at its boundary."""
     inside = np.clip(target.translation, box.low, box.high)
     distance = np.minimum(inside - box.low, box.high - inside).min()
-    return pin.SE3(target.rotation, inside), bool(distance < NEAR)
+    return pin.SE3(target.rotation, inside), bool(distance < ROUNDING)
 
 
 def clip_to_leash(
@@ -168,7 +168,7 @@ def clip_to_leash(
     offset = target.translation - measured.translation
     turn = pin.log3(target.rotation @ measured.rotation.T)
     distance, angle = float(np.linalg.norm(offset)), float(np.linalg.norm(turn))
-    tight = distance > leash.distance - NEAR or angle > leash.angle - NEAR
+    tight = distance > leash.distance - ROUNDING or angle > leash.angle - ROUNDING
     position, rotation = target.translation, target.rotation
     if distance > leash.distance:
         position = measured.translation + leash.distance / distance * offset

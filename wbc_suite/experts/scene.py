@@ -30,7 +30,7 @@ Steps: TypeAlias = Generator[None, None, T]
 """A skill: it yields once in each control period, and returns what came of it."""
 
 
-class Workcell(Generic[B]):
+class ExpertScene(Generic[B]):
     """The arms and objects of an environment that was reset.
 
     Attributes:
