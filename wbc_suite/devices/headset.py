@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import io
 import ssl
 from html import escape
 from http import HTTPStatus
@@ -9,11 +10,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Protocol
 
+import segno
 from aiohttp import web
 
-from wbc_suite.devices.qr_code import qr_svg, qr_text
 from wbc_suite.devices.stream import Stream
-from wbc_suite.errors import ConfigError, DeviceError
+from wbc_suite.errors import ConfigError
 from wbc_suite.web.certificate import (
     fingerprint,
     installation_certificate,
@@ -87,8 +88,9 @@ class Headset(Stream):
         """The address, its QR code where others reach it, and the ways to connect."""
         lines = [f"Headset: open {self.url} in its browser.", ""]
         if not is_loopback(self._host):
-            with contextlib.suppress(DeviceError):  # a host name that is too long
-                lines += [qr_text(self.url), ""]
+            code = io.StringIO()
+            segno.make_qr(self.url).terminal(code, compact=True)
+            lines.append(code.getvalue())
         lines += [
             f"  {k}. {title} {text}" for k, (title, text) in enumerate(self.ways, 1)
         ]
@@ -169,7 +171,10 @@ class Headset(Stream):
         )
 
     async def _send_qr(self, _: web.Request) -> web.Response:
-        return web.Response(text=qr_svg(self.url), content_type="image/svg+xml")
+        code = io.BytesIO()
+        picture = {"light": "#fff", "omitsize": True}
+        segno.make_qr(self.url).save(code, kind="svg", **picture)
+        return web.Response(body=code.getvalue(), content_type="image/svg+xml")
 
     async def _receive_frames(self, sender: web.WebSocketResponse) -> None:
         """Display the view to a sender while its frames are received."""

@@ -77,7 +77,8 @@ def generate(
 
     Seeds are taken one after the other until enough episodes are kept, or
     `TRIES_PER_EPISODE` times as many are played. Finished items wait in `OUT.work`:
-    the same call goes on there. `on_kept` is called with the number of episodes that an item kept.
+    the same call goes on there. `on_kept` is called with the number of episodes that an
+    item kept.
 
     Raises:
         DatasetError: If an item fails, or the file is of another environment.
