@@ -11,6 +11,10 @@ def env():
     return wbc_suite.make("Door", robots="Panda")
 
 
+def test_it_stands_on_a_table(env):
+    assert env.simulation.model.body("table").pos[2] == pytest.approx(0.8)
+
+
 def turn(env, *, hinge=0.0, lever=0.0):
     data = env.simulation.data
     data.joint("door_panel_joint").qpos[0] = hinge

@@ -52,3 +52,12 @@ def test_an_action_near_the_goal_is_one_call(monkeypatch):
     env = made("Panda", monkeypatch, in_loop=True)
     _, calls = states(env, far=0.01, actions=4)
     assert calls == [1] * 4
+
+
+def test_a_reset_forgets_the_progress_of_plans(monkeypatch):
+    env = made("Panda", monkeypatch, in_loop=True)
+    _, calls = states(env)
+    assert max(calls) > 1, "the planner has led a motion"
+    env.reset(seed=0)
+    *progress, _, _, _ = env.controllers[0]._planner.memory
+    assert not any(np.any(part) for part in progress)

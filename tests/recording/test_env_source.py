@@ -10,6 +10,7 @@ import pytest
 import wbc_suite
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import EnvSource
+from wbc_suite.recording.env_source import differences
 
 
 def parse(name="Lift", **arguments):
@@ -127,3 +128,14 @@ def test_a_trusted_path_is_read_and_its_error_is_reported():
 def test_an_unknown_benchmark_names_what_is_meant():
     with pytest.raises(DatasetError, match=r"cannot be made here.*Lift"):
         parse("Lyft", robots="Panda").build()
+
+
+def test_descriptions_differ_in_the_keys_of_nested_tables():
+    arguments = {"robots": "Panda", "horizon": 5, "reward": {"scale": 1.0, "step": 0.0}}
+    one = {"env_name": "Lift", "env_kwargs": arguments}
+    other = {"env_name": "Lift", "env_kwargs": arguments | {"horizon": 6}}
+    assert differences(json.dumps(one), json.dumps(one)) == ""
+    assert differences(json.dumps(one), json.dumps(other)) == "horizon is 5 and 6"
+    other["env_kwargs"]["reward"] = {"scale": 2.0, "step": 0.0}
+    found = differences(json.dumps(one), json.dumps(other))
+    assert found == "horizon is 5 and 6; reward.scale is 1.0 and 2.0"
