@@ -245,9 +245,9 @@ def measure(robot, seconds, folder):
         collection, period=1.0 / RATE, episode_control=episode_control
     )
     clock = Clock(collection, session)
-    page = PageProcess(session, "127.0.0.1", 0, label=robot)
+    page = PageProcess("127.0.0.1", 0, label=robot)
     session.tick()
-    page.wait()
+    page.attach(session)
     prepare_interpreter()
     session.start(urgent=True)
     viewers = [Viewer(page, number) for number in range(VIEWERS)]
