@@ -47,6 +47,7 @@ def test_each_client_has_its_versions_and_says_how_to_install_them():
         assert f"-r examples/clients/{script.stem}.txt" in script.read_text()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.peer
 @pytest.mark.slow
 @pytest.mark.parametrize("script", CLIENTS, ids=lambda path: path.stem)

@@ -25,6 +25,7 @@ def test_every_benchmark_has_an_id():
         assert environment_id(name) in gymnasium.registry
 
 
+@pytest.mark.sample(8)
 @pytest.mark.slow
 def test_random_actions_leave_everything_in_bounds(env):
     env.reset(seed=0)

@@ -30,6 +30,7 @@ def robot_and_furniture(model):
     return own, room
 
 
+@pytest.mark.sample(24)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BENCHMARKS)
 @pytest.mark.parametrize("robot", REACHING)

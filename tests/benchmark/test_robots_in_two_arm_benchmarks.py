@@ -15,6 +15,7 @@ CASES = [(name, "single-robot") for name in TWO_ARMED] + [
 ]
 
 
+@pytest.mark.sample(12)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BENCHMARKS)
 @pytest.mark.parametrize(("robots", "way"), CASES)

@@ -149,6 +149,7 @@ def test_a_long_hammer_does_not_start_with_its_head_beyond_the_table():
         assert (np.abs(head - env.benchmark.config.table.center[:2]) <= half).all()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("robots", ["Baxter", "Tiago", "GR1"])
 def test_random_actions_leave_everything_in_bounds(robots):

@@ -92,6 +92,7 @@ def test_the_reward_rises_from_reach_to_grasp_to_lift(both_hold):
     assert held == pytest.approx(wanted / 3.0, abs=2e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "robots",
     ["Baxter", pytest.param("GR1", marks=pytest.mark.slow)],

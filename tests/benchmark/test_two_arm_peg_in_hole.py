@@ -103,6 +103,7 @@ def test_the_pegs_radius_follows_the_seed():
     assert observation["object-state"].shape == (17,)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "robots", ["Baxter", pytest.param("GR1", marks=pytest.mark.slow)]
 )

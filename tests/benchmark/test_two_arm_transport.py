@@ -94,6 +94,7 @@ def test_it_starts_closed_with_the_keys_of_datasets(env):
     assert seen["object-state"].shape == (41,)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("robots", ["Baxter", "Tiago", "GR1"])
 def test_random_actions_leave_everything_in_bounds(robots):

@@ -37,6 +37,7 @@ def test_a_peer_that_is_missing_is_left_out(tmp_path):
     assert {"mujoco", "numpy"} <= report["about"]["versions"].keys()
 
 
+@pytest.mark.sweep
 @pytest.mark.peer
 @pytest.mark.slow
 def test_robosuite_stands_beside_us(tmp_path):

@@ -149,6 +149,7 @@ def test_humanoids_hand_follows_the_mouse_in_time(gr1, context):
     assert np.median(latencies) < most
 
 
+@pytest.mark.sweep
 def test_clutch_comes_in_again_without_a_jump(settled, context):
     session, page = settled
     viewer = Viewer(context, page.site)
@@ -187,6 +188,7 @@ def test_unreachable_target_is_explained_in_words(settled, context):
     assert any(word in words for word in ("limit", "conflict", "reach", "obstacle"))
 
 
+@pytest.mark.sweep
 def test_four_clients_do_not_fight(settled, context):
     session, page = settled
     first, second, _, fourth = (

@@ -240,6 +240,7 @@ def test_squeeze_engages_without_a_jump_and_the_hand_repeats_the_users(room, wea
     np.testing.assert_allclose(measured(session) - start, [0, 0, 0.08], atol=2e-3)
 
 
+@pytest.mark.sweep
 def test_hand_that_cannot_follow_is_red_and_pulses(room, wearer):
     session, _ = room
     wearer.press("squeeze", 1)
@@ -277,6 +278,7 @@ def test_hand_that_is_not_seen_lets_go(room, wearer):
     assert np.linalg.norm(measured(session) - start) < 1e-3
 
 
+@pytest.mark.sweep
 def test_page_that_draws_for_long_keeps_its_connection(wearer):
     socket = wearer.page.evaluate_handle("headset.connection.socket")
     for _ in range(3):

@@ -58,6 +58,7 @@ def interrupted(arguments, number, wait, cache=None):
     return process.returncode, printed
 
 
+@pytest.mark.sample(5)
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("command", COMMANDS)

@@ -40,6 +40,7 @@ def run(scene, seconds):
 
 
 # Hands in each other's way, and arms on their way out when they are called back.
+@pytest.mark.sample(6)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "trial"),

@@ -9,6 +9,7 @@ FAST = ("OSC_POSE absolute", "IK_POSE absolute", "JOINT_VELOCITY")
 reference = cache(lambda name: result(CASES[name], 20.0))
 
 
+@pytest.mark.sample(40)
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.slow

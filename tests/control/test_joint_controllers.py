@@ -39,6 +39,7 @@ def act(rig, values, part="right"):
     return rig.controller.layout.pack({part: values}, base=rig.controller.hold_action)
 
 
+@pytest.mark.sample(10)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_part_has_the_dimensions_and_bounds_of_the_table(alone, name):

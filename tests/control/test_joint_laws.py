@@ -69,6 +69,7 @@ def draw_targets(laws, drives, state, rng):
     laws["compensation"] = rng.choice([0.0, 1.0], size=len(laws))
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize(
     "name",
     [r if r in FAST else pytest.param(r, marks=pytest.mark.slow) for r in ROBOTS],

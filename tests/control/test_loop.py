@@ -53,6 +53,7 @@ def moves(env, count=8):
     return rng.uniform(-0.1, 0.1, (count, env.action_space.shape[0]))
 
 
+@pytest.mark.sample(4)
 @pytest.mark.slow
 @pytest.mark.parametrize(("robot", "controller"), CASES)
 def test_plain_and_compiled_loop_give_the_same_states(robot, controller):

@@ -71,6 +71,7 @@ def test_the_input_range_scales_steps(rig):
     np.testing.assert_allclose(one.part.goal.translation - start, [0.1, 0, 0])
 
 
+@pytest.mark.sample(12)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
 @pytest.mark.parametrize("frame", ["world", "base", "eef"])

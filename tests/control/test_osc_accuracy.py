@@ -132,6 +132,7 @@ def test_a_circle_is_followed(rig, name):
     assert max(away[10:]) < 2e-3  # asked for: 5 mm
 
 
+@pytest.mark.sample(5)
 @pytest.mark.slow
 @pytest.mark.parametrize("kp", [100.0, 200.0, 300.0])
 @pytest.mark.parametrize("name", EVERY_ARM)

@@ -12,6 +12,7 @@ ROOT = HERE.parents[1]
 PYTHON = ROOT / ".venv-cluster/bin/python"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.peer
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ray", "slurm"])

@@ -131,6 +131,7 @@ def test_random_stacks_come_to_rest_and_say_why(seed):
     assert check(seed) <= CHATTER
 
 
+@pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(12, 132, 40))
 def test_many_random_stacks_come_to_rest_and_say_why(first):
@@ -140,6 +141,7 @@ def test_many_random_stacks_come_to_rest_and_say_why(first):
     assert len(restless) <= 1, restless
 
 
+@pytest.mark.sample(5)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(200, 220))
 def test_random_stacks_come_to_rest_at_200_hz(seed):

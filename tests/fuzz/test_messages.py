@@ -121,6 +121,7 @@ def megabytes(pid):
     return int(re.search(r"VmRSS:\s*(\d+)", status)[1]) / 1024
 
 
+@pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["stream", "headset"])
 def test_ten_thousand_messages_stop_neither_the_loop_nor_a_viewer(kind):

@@ -179,6 +179,7 @@ else:
 """
 
 
+@pytest.mark.sample(1)
 @pytest.mark.peer
 @pytest.mark.slow
 @pytest.mark.parametrize("library", ["sbx", "sb3"])
@@ -204,6 +205,7 @@ def test_cloning_asks_for_the_same_things(name):
     assert {key: first[key] for key in same} == {key: mine[key] for key in same}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.peer
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CLONING)
@@ -223,6 +225,7 @@ def test_cloning_trains_goes_on_and_is_evaluated(name, demonstrations, tmp_path)
     assert list((tmp_path / "tensorboard").iterdir())
 
 
+@pytest.mark.sample(1)
 @pytest.mark.peer
 @pytest.mark.slow
 @pytest.mark.parametrize("library", ["sbx", "sb3"])

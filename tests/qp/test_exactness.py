@@ -97,6 +97,7 @@ def test_optimum_is_exact_on_random_stacks(humanoid):
     assert compared >= 100
 
 
+@pytest.mark.sweep
 @pytest.mark.slow
 def test_optimum_is_exact_on_ten_thousand_random_stacks(humanoid):
     worst, compared = worst_deviation(humanoid, 14_000, seed=2)

@@ -144,6 +144,7 @@ def test_combination_moves(combination):
     check(combination)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_all_combinations_move(robot):

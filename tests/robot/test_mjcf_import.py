@@ -114,6 +114,7 @@ def assert_same_mechanics(original, ours, *, rng, bodies, sites, atol=TOLERANCE)
         np.testing.assert_allclose(e.qfrc_passive, d.qfrc_passive, atol=atol)
 
 
+@pytest.mark.sample(15)
 @pytest.mark.parametrize(("name", "root"), CASES)
 def test_exported_robots_are_read_back(name, root, tmp_path):
     robot = wbc_suite.load_robot(name, root=root)

@@ -104,6 +104,7 @@ class Lone:
         return SAG * (high - low)
 
 
+@pytest.mark.sample(15)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
@@ -170,6 +171,7 @@ class Sampler:
         return self.limit.distances[0]
 
 
+@pytest.mark.sample(15)
 @pytest.mark.parametrize(
     ("name", "count"),
     [(name, QUICK_FREE) for name in QUICK]

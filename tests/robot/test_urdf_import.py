@@ -254,6 +254,7 @@ def test_limbs_are_inferred_from_words(tmp_path, joints, groups):
     assert set(robot.groups) == set(groups.split())
 
 
+@pytest.mark.sample(15)
 @pytest.mark.parametrize(("name", "root"), CASES)
 def test_exported_robots_are_read_back(name, root, tmp_path):
     robot = wbc_suite.load_robot(name, root=root)
