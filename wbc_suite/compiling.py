@@ -120,6 +120,10 @@ class Callback(types.WrapperAddressProtocol):
     def __init__(self, function: Callable[[], None]) -> None:
         self._entry = ctypes.CFUNCTYPE(None)(function)
 
+    def __call__(self) -> None:
+        """Call the function."""
+        self._entry()
+
     def __wrapper_address__(self) -> int:
         """Return the address of the machine code."""
         return ctypes.cast(self._entry, ctypes.c_void_p).value or 0

@@ -53,9 +53,9 @@ class PackageLocator(UserProvidedCacheLocator):
         module = Path(py_file).relative_to(PACKAGE).with_suffix("")
         self._cache_path = str(cache_folder() / ".".join(module.parts))
 
-    def get_source_stamp(self) -> str:
+    def get_source_stamp(self) -> bytes:
         """Return nothing: the folder changes with the source."""
-        return ""
+        return b""
 
 
 @cache

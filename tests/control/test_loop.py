@@ -82,9 +82,9 @@ def test_an_action_is_one_call(controller, monkeypatch):
     env.reset(seed=0)
     counted = []
 
-    def count(*arguments):
-        counted.append(arguments[-1])
-        return advance(*arguments)
+    def count(*arguments, steps):
+        counted.append(steps)
+        return advance(*arguments, steps)
 
     monkeypatch.setattr("wbc_suite.envs.simulation.advance", count)
     env.step(env.hold_action)

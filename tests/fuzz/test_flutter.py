@@ -74,7 +74,7 @@ class Finite(Draw):
             one, axis=axis, target=pose[:3, 3], cost=self.cost(), **options
         )
 
-    def limits(self):
+    def limits(self):  # type: ignore[override]
         gain = self.rng.choice([0.5, 1.0])
         apart = [APART[ROBOTS.index(self.robot)]] if self.rng.random() < 0.5 else []
         return [PositionLimit(gain=gain), *apart]

@@ -229,8 +229,9 @@ class Simulation:
                 compiled=not self._runs_plain,
             )
             records = *self._records, kernels, self._bodies
-            self._law_arguments = self._physics, *records
-            self._loop_arguments = *self._first, *records, *self._last
+            law: tuple[Any, ...] = self._physics, *records
+            loop: tuple[Any, ...] = *self._first, *records, *self._last
+            self._law_arguments, self._loop_arguments = law, loop
             self._needed = needed
 
     def _call_loop(self, steps: int) -> int:
@@ -239,7 +240,7 @@ class Simulation:
         done = -1
         if math.isfinite(self.data.time):
             if self.compiled:
-                done = advance(*self._loop_arguments, steps)
+                done = advance(*self._loop_arguments, steps=steps)
             elif self._watch.is_usable():
                 done = steps if self._step_in_python(steps) else -1
         if done < 0:

@@ -168,7 +168,8 @@ def _check_rows(model: mujoco.MjModel, name: str, valid: Any, rule: str) -> None
         return
     row, part = int(np.argwhere(~valid)[0, 0]), name.partition("_")[0]
     find: Any = getattr(model, part, None)
-    owner = (find(row).name if callable(find) else "") or f"number {row}"
+    name_of_row = getattr(find(row), "name", "") if callable(find) else ""
+    owner = name_of_row or f"number {row}"
     raise PhysicsError(
         f"{name} of {part} '{owner}' is {getattr(model, name)[row]}, {rule}."
     )

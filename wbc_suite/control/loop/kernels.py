@@ -56,9 +56,9 @@ class LoopKernels(NamedTuple):
     prepare: Callable[[], None]
     keep_direction: Callable[..., None]
     observe: Callable[..., None]
-    run_tick: Callable[..., bool] | None
-    solve_body: Callable[..., bool] | None
-    write_body: Callable[..., None] | None
+    run_tick: Callable[..., bool]
+    solve_body: Callable[..., bool]
+    write_body: Callable[..., None]
 
 
 @inner
@@ -143,14 +143,17 @@ def bind_kernels(
         laws["kernel"][laws["kind"] == kind] = k
     observe = observe_disturbances if laws["observer"].any() else no_observer
     owner = Callback(prepare)
+    run: Any = ticks and address(run_tick, ticks[0], *of_tick)
+    solve: Any = bodies and address(solve_whole_body, physics, bodies[0])
+    write: Any = bodies and address(write_whole_body, physics, bodies[0])
     found = LoopKernels(
         law=tuple(kernels),
         prepare=owner if compiled else nothing,
         keep_direction=kernels[0] if compiled else plain(keep_direction),
         observe=address(observe, physics, laws, drives, bodies),
-        run_tick=ticks and address(run_tick, ticks[0], *of_tick),
-        solve_body=bodies and address(solve_whole_body, physics, bodies[0]),
-        write_body=bodies and address(write_whole_body, physics, bodies[0]),
+        run_tick=run,
+        solve_body=solve,
+        write_body=write,
     )
     if compiled:
         with warnings.catch_warnings():  # a tuple of functions is new in numba
