@@ -257,7 +257,7 @@ class Damage:
             node.attrs[key] = json.dumps(self.of_data(json.loads(value)))
             return
         del node.attrs[key]
-        wrong = [*NUMBERS, "", "x", b"\xff\xfe", np.zeros(3), np.str_("[" * 3000)]
+        wrong = [*NUMBERS, "", "x", b"\xff\xfe", np.zeros(3), "[" * 3000]
         wrong += [h5py.Empty("f8"), node.ref, "9" * 5000, rng.choice(self.outside)]
         if rng.random() < 0.8:
             node.attrs[key] = rng.choice(wrong)

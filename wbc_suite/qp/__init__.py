@@ -16,12 +16,13 @@ from wbc_suite.qp.frame_task import FrameTask, RelativeFrameTask
 from wbc_suite.qp.joint_coupling_task import JointCouplingTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
 from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, RowLimit
+from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, LimitKind, RowLimit
 from wbc_suite.qp.look_at_task import LookAtTask
 from wbc_suite.qp.motion import Approach, Escaping, Motion, Overshoot, Relaxed
 from wbc_suite.qp.obstacle_limit import ObstacleLimit
 from wbc_suite.qp.posture_task import DampingTask, PostureTask
 from wbc_suite.qp.problem import Problem
+from wbc_suite.qp.registry import LIMITS, TASKS, register_limit, register_task
 from wbc_suite.qp.report import (
     ActiveLimit,
     Conflict,
@@ -38,6 +39,8 @@ from wbc_suite.qp.standing_limits import Sole, SupportLimit, WeightLimit
 from wbc_suite.qp.task import JointTask, RowTask, Task
 
 __all__ = [
+    "LIMITS",
+    "TASKS",
     "AccelerationLimit",
     "ActiveLimit",
     "Approach",
@@ -54,6 +57,7 @@ __all__ = [
     "FloorLimit",
     "FrameEquality",
     "FrameTask",
+    "JointBounds",
     "JointCouplingTask",
     "JointTask",
     "Kernel",
@@ -86,4 +90,6 @@ __all__ = [
     "TickRecord",
     "VelocityLimit",
     "WeightLimit",
+    "register_limit",
+    "register_task",
 ]

@@ -15,6 +15,7 @@ from wbc_suite.control.composite.whole_body_config import (
 )
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.reasons import NoSolution, Reason
+from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.qp import ActiveLimit, LimitKind, ObstacleLimit
 from wbc_suite.robot import RobotDescription
@@ -64,6 +65,10 @@ class MinkBackend:
         commanded: Configuration,
         obstacles: ObstacleLimit | None = None,
     ) -> None:
+        if config.tasks or config.more_limits:
+            raise ConfigError(
+                "WHOLE_BODY_MINK_IK takes no [[task]] or [[limit]]: use WHOLE_BODY_IK."
+            )
         self._config, self._commanded = config, commanded
         self._model = robot.to_mjspec().compile()
         self._conversion = Conversion(self._model, commanded.model)

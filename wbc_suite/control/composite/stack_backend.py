@@ -35,6 +35,7 @@ from wbc_suite.qp import (
     TaskStack,
     TickRecord,
 )
+from wbc_suite.qp.registry import LIMITS, TASKS, made_of
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -71,6 +72,7 @@ class StackBackend:
             sideways = FrameEquality(base, directions=("y",), hold_pose=False)
             equalities.append(sideways)
         limits = make_limits(robot, config)
+        limits += [made_of(LIMITS, table) for table in config.more_limits]
         if obstacles.pairs:
             limits.append(obstacles)
         self.self_collision = next(
@@ -85,7 +87,8 @@ class StackBackend:
             equalities=equalities,
             escape=False,
         )
-        self.stack = make_stack([*self._tasks, self._posture])
+        others = [made_of(TASKS, table) for table in config.tasks]
+        self.stack = make_stack([*self._tasks, self._posture, *others])
         self.v: Vector = np.zeros(commanded.nv)
         max_acceleration = accelerations(robot, config, commanded)
         self.torque_limiter = TorqueLimiter(robot, commanded, max_acceleration)

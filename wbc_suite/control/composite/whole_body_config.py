@@ -1,6 +1,7 @@
 """Config of the whole-body composites: `controllers/{robot}_whole_body_ik.toml`."""
 
 from collections.abc import Collection, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, Union
 
 from pydantic import (
@@ -18,6 +19,8 @@ from wbc_suite.control.part.feasible_acceleration import weight_shares
 from wbc_suite.control.part.part_settings import InputFrame, InputType, check_axes
 from wbc_suite.control.part.stance_controller import HeldFrame
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.qp import LIMITS, TASKS
+from wbc_suite.registry import Registry
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.mjcf_export import STOP_MARGIN
@@ -49,6 +52,23 @@ GoalsConfig: TypeAlias = Union["WholeBodyIKConfig", "WholeBodyIDConfig"]
 
 FEW_JOINTS = 0.02  # [cost]/rad of a hand that less than six joints move
 CLOSE_FIT = 0.0025  # m; small arms have links 5 mm apart wherever they are
+
+
+def _with_type(registry: Registry[Any], table: dict[str, Any]) -> dict[str, Any]:
+    """Return a table; ValueError if its `type` is no name of a registry."""
+    try:
+        return table | {"type": registry.spelled(table.get("type"))}
+    except UnknownNameError as error:
+        raise ValueError(str(error)) from error
+
+
+TaskTable: TypeAlias = Annotated[
+    dict[str, Any], AfterValidator(partial(_with_type, TASKS))
+]
+LimitTable: TypeAlias = Annotated[
+    dict[str, Any], AfterValidator(partial(_with_type, LIMITS))
+]
+"""The `type` of a registered task or limit, and its arguments."""
 
 
 def _registered(kind: str) -> str:
@@ -178,6 +198,9 @@ class WholeBodyIKConfig(FrozenModel):
         type: Registered name.
         frames: Controlled frames, in the order of the action.
         held: Frames in contact.
+        tasks: Tasks beside those of frames and posture, `[[task]]`: the `type` is a
+            registered name, the other keys are arguments of the task.
+        more_limits: Limits beside `limits`, `[[limit]]`, likewise.
         locked: Groups of joints that are kept at the posture.
         posture: Pull to a posture.
         limits: Limits of the command.
@@ -201,6 +224,8 @@ class WholeBodyIKConfig(FrozenModel):
     type: str = "WHOLE_BODY_IK"
     frames: tuple[ControlledFrame, ...] = Field(alias="frame", min_length=1)
     held: tuple[HeldFrame, ...] = ()
+    tasks: tuple[TaskTable, ...] = Field(default=(), alias="task")
+    more_limits: tuple[LimitTable, ...] = Field(default=(), alias="limit")
     locked: tuple[Name, ...] = ()
     posture: PostureConfig = PostureConfig()
     limits: LimitsConfig = LimitsConfig()
