@@ -57,6 +57,16 @@ def test_wilson_intervals_are_those_of_the_literature():
     assert success_interval(10, 10)[1] == 1.0
 
 
+def test_wilson_intervals_are_those_of_scipy():
+    from scipy.stats import binomtest
+
+    for n in (1, 7, 500):
+        for k in {0, 1, n // 3, n}:
+            ours = success_interval(k, n)
+            theirs = binomtest(k, n).proportion_ci(method="wilson")
+            assert ours == pytest.approx(tuple(theirs), abs=1e-12)
+
+
 def test_exact_intervals_are_those_of_the_literature():
     # 0 of 10 and 3 of 10 in Clopper and Pearson's chart, as tables print them.
     assert success_interval(0, 10, "exact") == pytest.approx((0.0, 0.3085), abs=1e-4)

@@ -118,16 +118,15 @@ def _key(payload: Mapping[str, Any]) -> str:
 
 
 def prepare_rollouts(item: WorkItem) -> None:
-    """Make the environment of an item and take an action, which compiles kernels.
+    """Make the environment of an item and play an episode, which compiles kernels.
 
-    Workers that are forked then have all of it. Errors are left to the item itself.
+    Workers that are forked then have all of it: some kernels are compiled when they are
+    first needed, such as at the first saturation. Errors are left to the item itself.
     """
     _kept.cache_clear()
-    seed = item.payload["seeds"][0]
     with suppress(WbcError):
         env = _kept(_key(item.payload))
-        observation, _ = env.reset(seed=seed)
-        env.step(make_policy(item.payload["policy"], env, seed)(observation))
+        _attempt(env, env, item.payload["seeds"][0], item.payload)
 
 
 class ErrorKind(StrEnum):
