@@ -94,6 +94,19 @@ def test_a_task_of_ours_runs_in_the_loop():
         ({"task": [{"type": "DampingTask", "cost": 1.0, "n": 1}]}, "'n'"),
         ({"task": [{"type": "LookAtTask", "frame": "nowhere"}]}, "nowhere"),
         ({"limit": {"type": "FloorLimit"}}, "limit"),
+        ({"task": [{"type": "FrameTask", "frame": 5}]}, "5"),
+        ({"task": [{"type": "FrameTask", "frame": ["a"]}]}, "a"),
+        (
+            {"task": [{"type": "FrameTask", "frame": "right_tcp", "target": "x"}]},
+            "right_tcp",
+        ),
+        ({"task": [{"type": "PostureTask", "cost": 1.0, "costs": 3}]}, "PostureTask"),
+        ({"task": [{"type": "ComTask", "target": [[0.0]]}]}, "target"),
+        ({"limit": [{"type": "VelocityLimit", "scale": "1"}]}, "scale"),
+        (
+            {"limit": [{"type": "AccelerationLimit", "acceleration": {}}]},
+            "AccelerationLimit",
+        ),
     ],
 )
 def test_what_is_wrong_is_told(changes, words):

@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, WbcError
 from wbc_suite.qp.com_task import ComTask
 from wbc_suite.qp.floor_limit import FloorLimit
 from wbc_suite.qp.frame_task import FrameTask, RelativeFrameTask
@@ -50,16 +50,18 @@ def made_of(registry: Registry[Callable[..., T]], table: Mapping[str, Any]) -> T
 
     Raises:
         UnknownNameError: If nothing is registered by the type.
-        ConfigError: If there are other arguments than it takes.
+        ConfigError: If there are other arguments than it takes, or of another type.
     """
     arguments = dict(table)
     name = str(arguments.pop("type"))
     make = registry[name]
     try:
         inspect.signature(make).bind(**arguments)
-    except TypeError as error:
+        return make(**arguments)
+    except WbcError:
+        raise
+    except (TypeError, ValueError, AttributeError) as error:
         raise ConfigError(f"{registry.kind} '{name}': {error}.") from error
-    return make(**arguments)
 
 
 for _task in (
