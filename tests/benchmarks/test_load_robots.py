@@ -12,6 +12,7 @@ from wbc_suite.catalogue import Catalogue
 ROOT = Path(__file__).parent.parent.parent
 
 
+@pytest.mark.sweep
 @pytest.mark.slow
 def test_every_robot_has_its_rows(tmp_path):
     script, path = ROOT / "benchmarks" / "load_robots.py", tmp_path / "out.json"

@@ -11,6 +11,7 @@ ROOT = Path(__file__).parent.parent.parent
 CASE = "Lift/Panda/WHOLE_BODY_IK"
 
 
+@pytest.mark.sweep
 @pytest.mark.slow
 def test_threads_stand_beside_processes(tmp_path):
     script, path = ROOT / "benchmarks" / "scaling.py", tmp_path / "out.json"

@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parent.parent.parent
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["Panda", "GR1", "Tiago", "SpotWithArm"])
 def test_sampled_targets_are_met_in_simulation(robot, tmp_path):

@@ -14,7 +14,7 @@ HURRIED = {"Baxter": 1}
 ROOT = Path(__file__).parent.parent.parent
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["Panda", "Sawyer", "UR5e", "Baxter", "Tiago"])
 def test_hands_track(robot, tmp_path):

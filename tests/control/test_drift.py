@@ -124,7 +124,7 @@ def test_all_zeros_hold_the_hand_of_a_panda(robots, case):
     assert drift(robots("panda"), case, zeros)["right"] < MOST
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", arms())
 def test_an_action_of_nothing_holds_every_hand(robots, name):

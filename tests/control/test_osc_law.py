@@ -70,7 +70,7 @@ def test_the_kernel_equals_the_formula(alone, name, saturation):
     assert max(disagreement(rig, seed) for seed in range(60)) < 1e-10
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.slow
 @pytest.mark.parametrize("saturation", ["clip", "qp"])
 @pytest.mark.parametrize("name", ARMS)

@@ -122,7 +122,7 @@ print(t.hashlib.sha256(t.episode(env, 5).tobytes()).hexdigest())
 """
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", CONTROLLERS)
 @pytest.mark.parametrize("robot", ROBOTS)

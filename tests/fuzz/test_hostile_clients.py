@@ -499,7 +499,7 @@ def folder(tmp_path_factory):
     return folder
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_hostile_clients_neither_read_nor_move_anything(name, folder):
     if "headset, open" in name and not shutil.which("openssl"):

@@ -179,7 +179,7 @@ else:
 """
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sweep
 @pytest.mark.peer
 @pytest.mark.slow
 @pytest.mark.parametrize("library", ["sbx", "sb3"])
@@ -225,7 +225,7 @@ def test_cloning_trains_goes_on_and_is_evaluated(name, demonstrations, tmp_path)
     assert list((tmp_path / "tensorboard").iterdir())
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sweep
 @pytest.mark.peer
 @pytest.mark.slow
 @pytest.mark.parametrize("library", ["sbx", "sb3"])

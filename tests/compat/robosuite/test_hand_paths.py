@@ -48,7 +48,7 @@ def theirs():
     return run(PEER, PYTHONPATH="")
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(2)
 @pytest.mark.peer
 @pytest.mark.parametrize("case", hand_paths.CASES)
 def test_path_is_that_of_robosuite(ours, theirs, case):
