@@ -122,6 +122,18 @@ def test_command_knows_at_once_that_a_robot_is_missing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_robots_are_those_of_each_benchmark_by_default():
+    from wbc_suite.cli.evaluate import _cases
+
+    def robots(*given):
+        names = ["Lift", "TwoArmLift"]
+        cases = _cases(names, given, None, ["hold"], None, arguments={})
+        return [case.robots for case in cases]
+
+    assert robots() == [("Panda",), ("Panda", "Panda")]
+    assert robots("UR5e", "Panda,Sawyer") == 2 * [("UR5e",), ("Panda", "Sawyer")]
+
+
 @pytest.mark.slow
 def test_a_served_policy_is_evaluated(tmp_path):
     words = [

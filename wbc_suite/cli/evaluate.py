@@ -37,8 +37,8 @@ RobotsOption = Annotated[
     list[str],
     typer.Option(
         help="Robot; A,B for two in one scene. Repeat to compare robots.",
-        default_factory=lambda: ["Panda"],
-        show_default="Panda",
+        default_factory=list,
+        show_default="those of each benchmark",
     ),
 ]
 ControllersOption = Annotated[
@@ -228,7 +228,7 @@ def _cases(
     arguments: dict[str, str | int | float | bool],
 ) -> "list[Case]":
     """Return every combination; raise an error at once for an unknown name."""
-    from wbc_suite.benchmark import BENCHMARKS
+    from wbc_suite.benchmark import BENCHMARKS, load_benchmark
     from wbc_suite.evaluation import PERTURBATIONS, Case
 
     changes = ["" if name == "none" else name for name in perturb or ["none"]]
@@ -243,9 +243,10 @@ def _cases(
     spelled = {
         name: BENCHMARKS.spelled(name) for name in benchmarks if name in BENCHMARKS
     }
-    every = itertools.product(
-        policies, benchmarks, robots, controllers or [None], changes
-    )
+    teams = {
+        name: robots or [",".join(load_benchmark(name).robots)] for name in benchmarks
+    }
+    every = itertools.product(policies, benchmarks, controllers or [None], changes)
     return [
         Case(
             benchmark=spelled.get(benchmark, benchmark),
@@ -255,7 +256,8 @@ def _cases(
             perturb=change,
             arguments=tuple(sorted(arguments.items())),
         )
-        for policy, benchmark, together, controller, change in every
+        for policy, benchmark, controller, change in every
+        for together in teams[benchmark]
     ]
 
 
