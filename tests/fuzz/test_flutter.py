@@ -74,10 +74,10 @@ class Finite(Draw):
             one, axis=axis, target=pose[:3, 3], cost=self.cost(), **options
         )
 
-    def limits(self):  # type: ignore[override]
+    def limits(self):
         gain = self.rng.choice([0.5, 1.0])
         apart = [APART[ROBOTS.index(self.robot)]] if self.rng.random() < 0.5 else []
-        return [PositionLimit(gain=gain), *apart]
+        return {"limits": [PositionLimit(gain=gain), *apart]}
 
     def feet(self):
         feet = [f.name for f in self.robot.frames if f.role == "foot"]
@@ -89,7 +89,7 @@ def random_stack(seed):
     kind = draw.rng.choice(["inside", "edge", "outside"])
     robot = Configuration(draw.model, draw.q(kind))
     tasks = [draw.task(k) for k in range(draw.rng.integers(1, 6))]
-    return TaskStack(robot, tasks, limits=draw.limits(), equalities=draw.feet())
+    return TaskStack(robot, tasks, **draw.limits(), equalities=draw.feet())
 
 
 def run(stack, seconds, dt):

@@ -109,12 +109,12 @@ def serve(
         return
     preparing = PreparingPage(site, robot, label=label)
     session.call("opened", site.url, site.token)
+    from wbc_suite.viewers.teleop_page import TeleopPage  # takes seconds
+
     session.wait(preparing.show)
     if session.lost.is_set():
         site.stop()
         return
-    from wbc_suite.viewers.teleop_page import TeleopPage
-
     preparing.close()
     page = TeleopPage(session, site, label=label)
     page.start()
