@@ -184,6 +184,16 @@ class MujocoXMLObject(MujocoObject, MujocoXML):  # pyright: ignore[reportIncompa
                 own.remove(joint)
         return own
 
+    @property
+    def bottom_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - read from the file
+        """Offset of its lowest point from its origin, m."""
+        return self._extents.get("bottom_site", super().bottom_offset)
+
+    @property
+    def top_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - read from the file
+        """Offset of its highest point from its origin, m."""
+        return self._extents.get("top_site", super().top_offset)
+
     def _extent(self) -> Extent:
         return self._measured
 
