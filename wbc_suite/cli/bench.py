@@ -44,19 +44,18 @@ def bench(
 
     import wbc_suite
     from wbc_suite.envs import RobotEnv
+    from wbc_suite.recording.atomic_files import write_bytes
     from wbc_suite.timing import time_frames
 
-    options.check_names(
-        benchmarks=[benchmark],
-        robots=options.robot_names(robots or ()),
-        controllers=[controller],
+    arguments = options.environment_arguments(
+        benchmark,
+        robots=robots,
+        controller=controller,
         gripper=gripper,
         base=base,
+        horizon=10**9,
     )
-    arguments = options.environment_arguments(
-        robots=robots, controller=controller, gripper=gripper, base=base
-    )
-    arguments |= {"control_freq": rate, "horizon": 10**9}
+    arguments |= {"control_freq": rate}
     env = wbc_suite.make(benchmark, **arguments).unwrapped
     assert isinstance(env, RobotEnv), "`make` made it"
     found = _times(env, actions)
@@ -70,7 +69,7 @@ def bench(
     _print_table(f"{benchmark}, {names}, {rate:g} Hz", found)
     if output is not None:
         text = json.dumps({"us": {k: times.tolist() for k, times in found.items()}})
-        options.write_file(output, lambda path: path.write_text(text + "\n", "utf-8"))
+        write_bytes(output, f"{text}\n".encode())
 
 
 def _times(env: "RobotEnv", actions: int) -> "dict[str, Vector]":

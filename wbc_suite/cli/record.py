@@ -41,9 +41,6 @@ PolicyOption = Annotated[
         "gamepad or dualsense (move while L1 is held), mjgui or your own module:Class."
     ),
 ]
-HorizonOption = Annotated[
-    int | None, typer.Option(min=1, help="Maximum actions of an episode.")
-]
 RateOption = Annotated[
     float | None,
     typer.Option(help="Actions per second; default 20, with a device 100."),
@@ -71,9 +68,6 @@ RecoveriesOption = Annotated[
         "corrects; marked as `disturbed`.",
     ),
 ]
-WorkersOption = Annotated[
-    int | None, typer.Option(min=1, help="Workers; one per processor by default.")
-]
 PageOption = Annotated[bool, typer.Option(help="Serve a page that shows the scene.")]
 
 
@@ -85,7 +79,7 @@ def record(
     device: PolicyOption = "expert",
     episodes: Annotated[int, typer.Option(min=1, help="Episodes to keep.")] = 10,
     controller: options.ControllerOption = None,
-    horizon: HorizonOption = None,
+    horizon: options.HorizonOption = None,
     rate: RateOption = None,
     seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
     only_success: OnlySuccessOption = False,
@@ -93,7 +87,7 @@ def record(
     noise: NoiseOption = 0.0,
     recoveries: RecoveriesOption = 0.0,
     executor: options.ExecutorOption = "process",
-    workers: WorkersOption = None,
+    workers: options.WorkersOption = None,
     camera: options.CamerasOption = None,
     size: options.PictureSizeOption = 84,
     device_option: options.DeviceOptions = None,
@@ -118,23 +112,22 @@ def record(
     from wbc_suite.recording.episode_control import RecordingPlan
 
     by_hand = is_device(device)
-    options.check_names(
-        benchmarks=[benchmark],
-        robots=options.robot_names(robots or ()),
-        controllers=[controller],
-        policies=[] if by_hand else [device],
-        devices=DEVICES,
+    rate = rate or (BY_HAND if by_hand else BY_POLICY)
+    arguments = options.environment_arguments(
+        benchmark,
+        robots=robots,
+        controller=controller,
         gripper=gripper,
         base=base,
+        horizon=round(ONE_DAY * rate) if by_hand else horizon,
+        policies=[] if by_hand else [device],
+        devices=DEVICES,
     )
     named = options.robot_names(robots or load_benchmark(benchmark).robots)
-    rate = rate or (BY_HAND if by_hand else BY_POLICY)
-    controller = controller or (default_controller(*named) if by_hand else None)
-    arguments = options.environment_arguments(
-        robots=robots, controller=controller, gripper=gripper, base=base
-    )
+    if by_hand and controller is None:
+        arguments["controller_configs"] = default_controller(*named)
     arguments |= options.camera_arguments(camera, size)
-    arguments |= _timing(rate, horizon, by_hand=by_hand)
+    arguments |= {"control_freq": rate, "terminate_on_success": not by_hand}
     common: dict[str, Any] = {"benchmark": benchmark, "arguments": arguments}
     if not by_hand:
         kept: dict[str, Any] = {"only_success": only_success, "next_obs": next_obs}
@@ -195,14 +188,6 @@ def record_policy(
         print(f"Too few successes: kept {found.kept} of {episodes}.", file=sys.stderr)
 
 
-def _timing(rate: float, horizon: int | None, *, by_hand: bool) -> dict[str, Any]:
-    """Return the arguments of `make` that say how fast and how long episodes are."""
-    timing: dict[str, Any] = {"control_freq": rate, "terminate_on_success": not by_hand}
-    if horizon or by_hand:
-        timing["horizon"] = round(ONE_DAY * rate) if by_hand else horizon
-    return timing
-
-
 def _record_by_hand(
     out: Path,
     plan: "RecordingPlan",
@@ -232,12 +217,11 @@ def _record_by_hand(
                 seed=seed,
                 device=device(env),
                 episode_control=EpisodeControl(
-                    collected.recorder, seed=seed, plan=plan, report=_print_message
+                    collected.recorder,
+                    seed=seed,
+                    plan=plan,
+                    report=lambda message: print(f"  {message}", flush=True),
                 ),
                 **driving,
             )
     print(f"{out}: {collected.recorder.kept} episodes.")
-
-
-def _print_message(message: str) -> None:
-    print(f"  {message}", flush=True)

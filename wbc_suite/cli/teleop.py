@@ -8,23 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wbc_suite.cli.options import (
-    BaseOption,
-    CatalogueOption,
-    DeviceOptions,
-    GripperOption,
-    HostOption,
-    MirrorOption,
-    PortOption,
-    RobotsOption,
-    ScaleOption,
-    SkinOption,
-    check_names,
-    chosen,
-    device_options,
-    print_address,
-    robot_names,
-)
+from wbc_suite.cli import options
 from wbc_suite.cli.output import print
 
 if TYPE_CHECKING:
@@ -78,49 +62,49 @@ RecordOption = Annotated[
 def teleop(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to run.")] = "Lift",
     others: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
-    robots: RobotsOption = None,
+    robots: options.RobotsOption = None,
     controller: WholeBodyOption = None,
     rate: TargetRateOption = 100.0,
-    gripper: GripperOption = None,
-    base: BaseOption = None,
-    skin: SkinOption = None,
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    skin: options.SkinOption = None,
     seed: Annotated[int, typer.Option(help="Seed of the scene.")] = 0,
-    host: HostOption = "127.0.0.1",
-    port: PortOption = None,
+    host: options.HostOption = "127.0.0.1",
+    port: options.PortOption = None,
     device: DeviceOption = None,
-    device_option: DeviceOptions = None,
+    device_option: options.DeviceOptions = None,
     tls_cert: TlsCertOption = None,
     tls_key: TlsKeyOption = None,
-    scale: ScaleOption = 1.0,
-    mirror: MirrorOption = False,
+    scale: options.ScaleOption = 1.0,
+    mirror: options.MirrorOption = False,
     record: RecordOption = None,
-    catalogue: CatalogueOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Move a robot's hands, head, feet and base in a web page, or let it walk."""
     import wbc_suite
     from wbc_suite.recording.episode_control import EpisodeControl
     from wbc_suite.wrappers import DataCollection
 
-    names = robot_names([*(robots or ["GR1"]), *(others or ())])
-    check_names(
-        benchmarks=[benchmark],
+    names = options.robot_names([*(robots or ["GR1"]), *(others or ())])
+    arguments = options.environment_arguments(
+        benchmark,
         robots=names,
-        controllers=[controller],
+        controller=controller,
         gripper=gripper,
         base=base,
+        horizon=round(ONE_DAY * rate),
     )
-    pairs = [*(device_option or []), *tls_options(tls_cert, tls_key)]
+    arguments |= {"skin": skin, "control_freq": rate}
+    tls = {"tls_cert": tls_cert, "tls_key": tls_key}
+    pairs = [f"{name}={json.dumps(str(path))}" for name, path in tls.items() if path]
     with served_page((host, port), names, benchmark) as page:
-        make = None if device is None else device_maker(device, pairs)
-        arguments = {"robots": names, "gripper_types": chosen(gripper)}
-        arguments |= {"base_types": base, "skin": skin, "control_freq": rate}
-        arguments |= {"horizon": round(ONE_DAY * rate)}
+        make = device and device_maker(device, [*(device_option or ()), *pairs])
         arguments |= {"controller_configs": controller or default_controller(*names)}
         if page is not None:
             page.check()
         env: gymnasium.Env[Any, Any] = wbc_suite.make(benchmark, **arguments)
         episode_control = None
-        chosen_device = None if make is None else make(env)
+        chosen_device = make(env) if make else None
         if record is not None:
             env = collection = DataCollection(env, record, automatic=False)
             episode_control = EpisodeControl(collection.recorder, seed=seed)
@@ -159,7 +143,7 @@ def served_page(
     print(f"{title}: getting ready ...", flush=True)
     if address is not None:
         page = PageProcess(
-            *address, label=title, robot=robots[0], on_open=print_address
+            *address, label=title, robot=robots[0], on_open=options.print_address
         )
     try:
         yield page
@@ -182,24 +166,18 @@ def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
     """Return a function that makes a device with options `NAME=VALUE`."""
     from wbc_suite.devices import DEVICES
 
-    make, options = DEVICES.find(name), device_options(pairs)
+    make, given = DEVICES.find(name), options.device_options(pairs)
 
     def build(env: "gymnasium.Env[Any, Any]") -> "Device":
         if name.lower() == "mjgui":
-            options["env"] = env  # it shows the scene
+            given["env"] = env  # it shows the scene
         layout = env.unwrapped.action_layout  # type: ignore[attr-defined]
         walks = any(part.name.endswith("walk") for part in layout.slices)
         if walks and name.lower() in DRIVING:
-            options.setdefault("drives", True)
-        return make(**options)
+            given.setdefault("drives", True)
+        return make(**given)
 
     return build
-
-
-def tls_options(cert: Path | None, key: Path | None) -> list[str]:
-    """Return the options of a device for `--tls-cert` and `--tls-key`."""
-    given = {"tls_cert": cert, "tls_key": key}
-    return [f"{name}={json.dumps(str(path))}" for name, path in given.items() if path]
 
 
 def stages_of(device: str | None, *, scale: float, mirror: bool) -> "PipelineConfig":

@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.atomic_files import replace_file
+from wbc_suite.recording.atomic_files import check_folder, replace_file
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.typing import Vector
 
@@ -31,16 +31,8 @@ def write_plots(dataset: Dataset, path: Path) -> None:
     _bars(pen, 1, "Spread of each action", spread, [CURVE] * len(spread))
     sizes = np.linalg.norm(actions[:: len(actions) // MOST_DRAWN + 1], axis=1)
     _bars(pen, 2, "Size of the action over time", sizes, [CURVE] * len(sizes))
-    save_picture(sheet, path)
-
-
-def save_picture(picture: Image.Image, path: Path) -> None:
-    """Write a picture in the format of the path's suffix, or raise DatasetError."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(path, picture.save)
-    except (OSError, ValueError) as error:
-        raise DatasetError(f"'{path}' cannot be written: {error}.") from error
+    check_folder(path.parent)
+    replace_file(path, sheet.save)
 
 
 def _bars(

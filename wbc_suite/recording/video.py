@@ -18,7 +18,6 @@ from wbc_suite.recording.env_source import rebuild
 from wbc_suite.recording.episode import Episode
 from wbc_suite.recording.extras import import_extra
 from wbc_suite.recording.mp4_writer import Mp4Writer
-from wbc_suite.recording.plots import save_picture
 from wbc_suite.recording.replaying import play_actions, play_states
 
 Picture = NDArray[np.uint8]
@@ -95,7 +94,8 @@ def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> N
             sheet.paste(image, (column * SHEET_SIZE, row * height + LABEL))
     if env is not None:
         env.close()
-    save_picture(sheet, path)
+    check_folder(path.parent)
+    replace_file(path, sheet.save)
 
 
 def _write_animation(pictures: Iterable[Picture], path: Path, rate: float) -> None:

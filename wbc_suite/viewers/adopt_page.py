@@ -85,10 +85,6 @@ class AdoptPage:
                 self._add_sole(name)
         self._add_writing()
 
-    def stop(self) -> None:
-        """Close the page."""
-        self.page.stop()
-
     def _add_frame(self, name: str) -> None:
         frame = self.frames[name]
         role = self._gui.add_dropdown(

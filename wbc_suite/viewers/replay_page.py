@@ -36,7 +36,7 @@ KEYS: dict[str, tuple[str, Callable[[EpisodePlayer], None]]] = {
 class ReplayPage:
     """Serve a player of episodes; a thread of its own advances it and sends updates.
 
-    States are displayed in `env`, and `site`, the server, is stopped with the page.
+    States are displayed in `env`, until `site`, the server, is stopped.
     """
 
     def __init__(
@@ -65,10 +65,6 @@ class ReplayPage:
         self.site.start_updates(
             lambda n: self._display(self.player.advance(), panel=n % PANEL_EVERY == 0)
         )
-
-    def stop(self) -> None:
-        """Stop, and close the server."""
-        self.site.stop()
 
     def _display(self, status: PlayerStatus, *, panel: bool = True) -> None:
         """Display the state of the playback."""
