@@ -120,8 +120,7 @@ def evaluate(
     wbc-suite evaluate Lift Door --robots Panda --robots UR5e --policy my_module:Policy
     """
     from wbc_suite.evaluation import episode_seeds, plan_rollouts, run_rollouts
-    from wbc_suite.evaluation.films import film_failures
-    from wbc_suite.evaluation.results import collect
+    from wbc_suite.evaluation.results import collect, film_failures
     from wbc_suite.evaluation.rollouts import prepare_rollouts
     from wbc_suite.executors import Processes, make_executor, run_items
 

@@ -9,7 +9,7 @@ from typing import Any
 from wbc_suite.errors import ConfigError
 from wbc_suite.executors.executor import Outcome, Work, WorkItem, run_item
 
-POLL_SECONDS = 0.5
+POLL_SECONDS = 0.5  # between two looks at the jobs
 
 
 class RayCluster:
