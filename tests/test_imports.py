@@ -15,6 +15,8 @@ BASE = (
     "errors",
     "logs",
     "files",
+    "atomic_files",
+    "extras",
     "typing",
     "arguments",
     "timing",

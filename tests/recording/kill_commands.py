@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 from random_episodes import HEADER, make_episode
 
-from wbc_suite.recording import Dataset, Store, atomic_files, editing
+from wbc_suite import atomic_files
+from wbc_suite.recording import Dataset, Store, editing
 from wbc_suite.recording.converting import convert
 from wbc_suite.robot import load_robot
 

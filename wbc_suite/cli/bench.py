@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv
     from wbc_suite.typing import Vector
 
-BLOCKS = 5
-RESETS, PICTURES = 20, 50
+BLOCKS = 5  # of steps, with a reset before each
+RESETS, PICTURES = 20, 50  # that are timed
 SHARE = 0.05  # of the way from what holds the robot to a random action
 
 
@@ -43,8 +43,8 @@ def bench(
     import numpy as np
 
     import wbc_suite
+    from wbc_suite.atomic_files import write_bytes
     from wbc_suite.envs import RobotEnv
-    from wbc_suite.recording.atomic_files import write_bytes
     from wbc_suite.timing import time_frames
 
     arguments = options.environment_arguments(

@@ -50,9 +50,9 @@ def demo(
     """
     from PIL import Image
 
+    from wbc_suite.atomic_files import check_folder, replace_file
     from wbc_suite.control import load_composite_controller_config
     from wbc_suite.envs.hold_check import alone, hold_faults
-    from wbc_suite.recording.atomic_files import check_folder, replace_file
     from wbc_suite.recording.video import write_video
     from wbc_suite.robot import load_robot
 

@@ -249,9 +249,9 @@ def _cases(
 
 def _report(results: "Results", output: Path, *, as_json: bool) -> None:
     """Print figures and write the files; fail when an item failed."""
+    from wbc_suite.atomic_files import write_bytes
     from wbc_suite.compat.lerobot import eval_info
     from wbc_suite.evaluation.report import report_page
-    from wbc_suite.recording.atomic_files import write_bytes
 
     figures = results.figures()
     files = {

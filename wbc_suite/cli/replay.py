@@ -40,10 +40,9 @@ def replay(
     """Replay episodes, and report whether they match the recording bit for bit."""
     from wbc_suite.recording import Dataset, rebuild
     from wbc_suite.recording.video import check_video
-    from wbc_suite.viewers.episode_player import open_player
+    from wbc_suite.viewers.episode_player import open_player, show_in_window
     from wbc_suite.viewers.page_server import PageServer
     from wbc_suite.viewers.replay_page import ReplayPage
-    from wbc_suite.viewers.replay_window import show_in_window
 
     shown, by_states = {}, by == "states"
     if film is not None:

@@ -59,7 +59,7 @@ def render(
     """Draw a robot in the studio, without a display."""
     from PIL import Image
 
-    from wbc_suite.recording.atomic_files import replace_file
+    from wbc_suite.atomic_files import replace_file
     from wbc_suite.robot import load_robot
     from wbc_suite.viewers.offscreen import render_robot
 
@@ -93,7 +93,7 @@ def export_robot(
 
     A URDF gets a folder with meshes beside it for shapes that URDF lacks.
     """
-    from wbc_suite.recording.atomic_files import write_bytes
+    from wbc_suite.atomic_files import write_bytes
     from wbc_suite.robot import load_robot
 
     description = load_robot(
