@@ -238,8 +238,8 @@ def print_schema(
     ],
 ) -> None:
     """Print the JSON Schema of robot files, or of the frames that a stream takes."""
-    from wbc_suite.devices.pose_frame import frame_schema
+    from wbc_suite.devices.pose_frame import PoseFrame
     from wbc_suite.robot.robot_file import robot_schema
 
-    schema = frame_schema() if kind == "frame" else robot_schema(kind)
+    schema = PoseFrame.model_json_schema() if kind == "frame" else robot_schema(kind)
     print(json.dumps(schema, indent=2))

@@ -1,8 +1,6 @@
 """`wbc-suite record`: demonstrations into a file."""
 
 import sys
-from collections.abc import Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,21 +8,10 @@ import typer
 
 from wbc_suite.cli import options
 from wbc_suite.cli.output import print
-from wbc_suite.cli.teleop import (
-    ONE_DAY,
-    default_controller,
-    device_maker,
-    drive,
-    page_title,
-    served_page,
-    stages_of,
-)
+from wbc_suite.cli.teleop import ONE_DAY, run_session
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from wbc_suite.evaluation.generation import Plan
-    from wbc_suite.recording.episode_control import RecordingPlan
 
 BY_POLICY, BY_HAND = 20.0, 100.0  # Hz; an operator notices a latency of 50 ms
 SHOWN = 10  # episodes without success
@@ -123,30 +110,35 @@ def record(
         policies=[] if by_hand else [device],
         devices=DEVICES,
     )
-    named = options.robot_names(robots or load_benchmark(benchmark).robots)
-    if by_hand and controller is None:
-        arguments["controller_configs"] = default_controller(*named)
     arguments |= options.camera_arguments(camera, size)
     arguments |= {"control_freq": rate, "terminate_on_success": not by_hand}
     common: dict[str, Any] = {"benchmark": benchmark, "arguments": arguments}
     if not by_hand:
-        kept: dict[str, Any] = {"only_success": only_success, "next_obs": next_obs}
-        disturbed: dict[str, Any] = {"noise": noise, "pushes": recoveries}
-        plan = Plan(**common, policy=device, **kept, **disturbed)
+        plan = Plan(
+            **common,
+            policy=device,
+            only_success=only_success,
+            next_obs=next_obs,
+            noise=noise,
+            pushes=recoveries,
+        )
         record_policy(plan, out, episodes, seed, executor=executor, workers=workers)
         return
-    _record_by_hand(
-        out,
-        RecordingPlan(episodes=episodes, horizon=horizon, only_success=only_success),
+    kept = run_session(
         **common,
-        device=device_maker(device, device_option),
-        next_obs=next_obs,
-        robots=named,
-        rate=rate,
-        seed=seed,
+        robots=options.robot_names(robots or load_benchmark(benchmark).robots),
         address=(host, port) if page else None,
-        stages=stages_of(device, scale=scale, mirror=mirror),
+        device=device,
+        device_options=device_option,
+        stages={"scale": scale, "mirror": mirror},
+        seed=seed,
+        out=out,
+        next_obs=next_obs,
+        plan=RecordingPlan(
+            episodes=episodes, horizon=horizon, only_success=only_success
+        ),
     )
+    print(f"{out}: {kept} episodes.")
 
 
 def record_policy(
@@ -186,42 +178,3 @@ def record_policy(
     )
     if found.kept < episodes:
         print(f"Too few successes: kept {found.kept} of {episodes}.", file=sys.stderr)
-
-
-def _record_by_hand(
-    out: Path,
-    plan: "RecordingPlan",
-    *,
-    benchmark: str,
-    robots: Sequence[str],
-    arguments: dict[str, Any],
-    address: tuple[str, int | None] | None,
-    device: "Callable[[Any], Any]",
-    next_obs: bool,
-    seed: int,
-    **driving: Any,
-) -> None:
-    """Record what an operator does; `driving` are arguments of `drive`."""
-    import wbc_suite
-    from wbc_suite.recording.episode_control import EpisodeControl
-    from wbc_suite.wrappers import DataCollection
-
-    with served_page(address, robots, benchmark) as page:
-        env = wbc_suite.make(benchmark, **arguments)
-        collected = DataCollection(env, out, automatic=False, next_obs=next_obs)
-        with closing(collected):
-            drive(
-                collected,
-                page,
-                title=page_title(robots, benchmark),
-                seed=seed,
-                device=device(env),
-                episode_control=EpisodeControl(
-                    collected.recorder,
-                    seed=seed,
-                    plan=plan,
-                    report=lambda message: print(f"  {message}", flush=True),
-                ),
-                **driving,
-            )
-    print(f"{out}: {collected.recorder.kept} episodes.")

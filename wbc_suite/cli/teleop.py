@@ -1,7 +1,7 @@
-"""`wbc-suite teleop`, and what `record` shares with it: device, page, session."""
+"""`wbc-suite teleop`, and the session of an operator, which `record` has too."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import gymnasium
 
     from wbc_suite.devices import Device, PipelineConfig
-    from wbc_suite.recording.episode_control import EpisodeControl
+    from wbc_suite.recording.episode_control import RecordingPlan
     from wbc_suite.viewers.page_process import PageProcess
 
 ONE_DAY = 86_400  # s; horizon of a session, in place of the benchmark's
@@ -81,10 +81,6 @@ def teleop(
     catalogue: options.CatalogueOption = None,
 ) -> None:
     """Move a robot's hands, head, feet and base in a web page, or let it walk."""
-    import wbc_suite
-    from wbc_suite.recording.episode_control import EpisodeControl
-    from wbc_suite.wrappers import DataCollection
-
     names = options.robot_names([*(robots or ["GR1"]), *(others or ())])
     arguments = options.environment_arguments(
         benchmark,
@@ -97,53 +93,101 @@ def teleop(
     arguments |= {"skin": skin, "control_freq": rate}
     tls = {"tls_cert": tls_cert, "tls_key": tls_key}
     pairs = [f"{name}={json.dumps(str(path))}" for name, path in tls.items() if path]
-    with served_page((host, port), names, benchmark) as page:
-        make = device and device_maker(device, [*(device_option or ()), *pairs])
-        arguments |= {"controller_configs": controller or default_controller(*names)}
+    run_session(
+        benchmark,
+        arguments,
+        robots=names,
+        address=(host, port),
+        device=device,
+        device_options=[*(device_option or ()), *pairs],
+        stages={"scale": scale, "mirror": mirror},
+        seed=seed,
+        out=record,
+    )
+
+
+def run_session(
+    benchmark: str,
+    arguments: dict[str, Any],
+    *,
+    robots: Sequence[str],
+    address: tuple[str, int | None] | None,
+    device: str | None,
+    device_options: list[str] | None,
+    stages: Mapping[str, Any],
+    seed: int,
+    out: Path | None = None,
+    next_obs: bool = False,
+    plan: "RecordingPlan | None" = None,
+) -> int:
+    """Let an operator act until the session is ended, or its plan is recorded.
+
+    Args:
+        benchmark: Name or file.
+        arguments: Those of `make`; without a controller, `default_controller`. The
+            page is up before the environment is made.
+        robots: Names or files.
+        address: Host and port of the page; None for a device alone.
+        device: Name of a device beside the page.
+        device_options: Its options, `NAME=VALUE`.
+        stages: Changes of the pipeline's settings.
+        seed: Seed of every reset but those of recordings.
+        out: File for recorded episodes.
+        next_obs: See `Recorder`.
+        plan: What is recorded; None for what the operator asks for.
+
+    Returns:
+        Number of episodes in the file.
+    """
+    import wbc_suite
+    from wbc_suite.recording.episode_control import EpisodeControl
+    from wbc_suite.wrappers import DataCollection
+
+    title = f"{' and '.join(robots)} · {benchmark}"
+    with _served_page(address, robots[0], title) as page:
+        make = device and device_maker(device, device_options)
+        if "controller_configs" not in arguments:
+            arguments["controller_configs"] = default_controller(*robots)
         if page is not None:
             page.check()
         env: gymnasium.Env[Any, Any] = wbc_suite.make(benchmark, **arguments)
-        episode_control = None
-        chosen_device = make(env) if make else None
-        if record is not None:
-            env = collection = DataCollection(env, record, automatic=False)
-            episode_control = EpisodeControl(collection.recorder, seed=seed)
+        used, control = make(env) if make else None, None
+        if out is not None:
+            env = collected = DataCollection(
+                env, out, automatic=False, next_obs=next_obs
+            )
+            control = EpisodeControl(
+                collected.recorder,
+                seed=seed,
+                plan=plan,
+                report=lambda text: print(f"  {text}", flush=True),
+            )
         with closing(env):
-            drive(
+            _drive(
                 env,
                 page,
-                title=page_title(names, benchmark),
-                rate=rate,
+                title,
+                device=used,
+                period=1.0 / arguments["control_freq"],
                 seed=seed,
-                device=chosen_device,
-                stages=stages_of(device, scale=scale, mirror=mirror),
-                episode_control=episode_control,
+                pipeline=stages_of(device, **stages),
+                episode_control=control,
             )
-
-
-def page_title(robots: Sequence[str], benchmark: str) -> str:
-    """Return the title of a page."""
-    return f"{' and '.join(robots)} · {benchmark}"
+    return control.status.kept if control else 0
 
 
 @contextmanager
-def served_page(
-    address: tuple[str, int | None] | None, robots: Sequence[str], benchmark: str
+def _served_page(
+    address: tuple[str, int | None] | None, robot: str, title: str
 ) -> Iterator["PageProcess | None"]:
-    """Serve a page, or none, which shows the first robot until `drive` takes over.
-
-    Args:
-        address: Host and port; None for no page.
-        robots: Names or files.
-        benchmark: For the title.
-    """
+    """Serve a page, if it has an address; it shows a robot until there is a session."""
     from wbc_suite.viewers.page_process import PageProcess
 
-    page, title = None, page_title(robots, benchmark)
+    page = None
     print(f"{title}: getting ready ...", flush=True)
     if address is not None:
         page = PageProcess(
-            *address, label=title, robot=robots[0], on_open=options.print_address
+            *address, label=title, robot=robot, on_open=options.print_address
         )
     try:
         yield page
@@ -190,43 +234,22 @@ def stages_of(device: str | None, *, scale: float, mirror: bool) -> "PipelineCon
     return stages.model_copy(update={"mirror": mirror, "scale": scale})
 
 
-def drive(
+def _drive(
     env: "gymnasium.Env[Any, Any]",
     page: "PageProcess | None",
-    *,
     title: str,
-    rate: float,
-    seed: int,
+    *,
     device: "Device | None",
-    stages: "PipelineConfig",
-    episode_control: "EpisodeControl | None",
+    **session_arguments: Any,
 ) -> None:
-    """Run a session until it is ended, or all planned episodes are recorded.
-
-    Args:
-        env: Environment, made; the caller closes it.
-        page: Page of the session, which the caller stops; None for a device alone.
-        title: Names of the robots and of the benchmark.
-        rate: Actions per second, Hz.
-        seed: Seed of every reset but those of recordings.
-        device: A device beside the page.
-        stages: Stages between inputs and the controller.
-        episode_control: Starts and ends recorded episodes.
-    """
+    """Run a session with a device until it is ended; see `TeleopSession`."""
     from wbc_suite.devices.headset import Headset
     from wbc_suite.viewers.headset_view import SessionView
     from wbc_suite.viewers.loop_timing import prepare_interpreter
     from wbc_suite.viewers.status_text import timing_text
     from wbc_suite.viewers.teleop_session import TeleopSession
 
-    session = TeleopSession(
-        env,
-        period=1.0 / rate,
-        seed=seed,
-        device=device,
-        pipeline=stages,
-        episode_control=episode_control,
-    )
+    session = TeleopSession(env, device=device, **session_arguments)
     try:
         if device is not None:
             device.start()
