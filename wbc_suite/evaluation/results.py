@@ -211,11 +211,6 @@ def _comparisons(
 
 
 def _case(case: Case) -> dict[str, Any]:
-    return {
-        "case": case.title,
-        "benchmark": case.benchmark,
-        "robots": list(case.robots),
-        "controller": case.controller,
-        "policy": case.policy,
-        "perturb": case.perturb,
-    }
+    names = ("benchmark", "controller", "policy", "perturb")
+    given = {name: getattr(case, name) for name in names}
+    return {"case": case.title, "robots": list(case.robots)} | given

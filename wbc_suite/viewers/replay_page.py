@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import viser
 
 PANEL_EVERY = 3  # updates
-PLOT_POINTS = 200
+PLOT_POINTS = 200  # of a curve
 EFFORT, REWARD, NOW = "#4a6fa5", "#3f8f5b", "#c8553d"
 PLAY, PAUSE, PREVIOUS, NEXT = "Play", "Pause", "Previous", "Next"
 SPEED_LABELS: dict[str, float] = dict(
@@ -50,13 +50,12 @@ class ReplayPage:
         self._status = self.server.gui.add_html("")
         self._add_controls()
         self._plot = add_plot(
-            self.server,
+            self.server.gui,
             "Norm of the action (blue), reward (green)",
             {"now": NOW, "action": EFFORT, "reward": REWARD},
         )
         self._display(player.advance())
-        data = env.simulation.data
-        box = robot_box(env.simulation.model, data.xpos, data.xquat)
+        box = robot_box(env.simulation.model, env.simulation.data)
         set_camera(self.server, box)
         self.server.on_client_connect(lambda client: add_views(client, lambda: box))
 

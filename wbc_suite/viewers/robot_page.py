@@ -50,7 +50,7 @@ class RobotPage:
         self._overlays = Overlays(site.server, self.model, self.data, self.scene)
         self._add_joints()
         self.set_keyframe(next(iter(robot.keyframes), None))
-        set_camera(site.server, robot_box(self.model, self.data.xpos, self.data.xquat))
+        set_camera(site.server, robot_box(self.model, self.data))
 
     def set_keyframe(self, name: str | None) -> None:
         """Set a keyframe by its name; None sets every joint to zero."""
