@@ -1,8 +1,7 @@
 """Floor, light, camera, theme and colours of every page."""
 
 import colorsys
-import itertools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -155,10 +154,10 @@ def add_plot(
 
 
 def plot_series(
-    curves: Mapping[str, str], shown: Iterable[bool] = itertools.repeat(True)
+    curves: Mapping[str, str], shown: Sequence[bool] | None = None
 ) -> "tuple[viser.uplot.Series, ...]":
-    """Return the curves of a plot, some of which may be hidden."""
-    lines = zip(curves.items(), shown, strict=False)
+    """Return the curves of a plot; those that are not shown are hidden."""
+    lines = zip(curves.items(), shown or [True] * len(curves), strict=True)
     return (
         {"label": "s"},
         *(
