@@ -19,7 +19,9 @@ def open_hid(
     Raises:
         DeviceError: If hidapi or a device is missing, or may not be opened.
     """
-    hid = import_extra("hid", "devices", error=DeviceError, note=f" {kind} needs hidapi.")
+    hid = import_extra(
+        "hid", "devices", error=DeviceError, note=f" {kind} needs hidapi."
+    )
     found: dict[Any, dict[str, Any]] = {}
     for info in hid.enumerate():
         if info["vendor_id"] in vendors and info["product_id"] in products:
