@@ -14,7 +14,8 @@ from wbc_suite.evaluation import make_policy
 from wbc_suite.sensing.renderer import make_renderer
 from wbc_suite.tomlfile import read_toml
 from wbc_suite.typing import Matrix
-from wbc_suite.viewers.offscreen import View, fit_camera, subject_corners
+from wbc_suite.viewers.model_scene import subject_corners
+from wbc_suite.viewers.offscreen import View, fit_camera
 
 HERE = Path(__file__).parent
 FOLDER = HERE / "images" / "benchmarks"

@@ -20,6 +20,8 @@ BASE = (
     "errors",
     "logs",
     "files",
+    "atomic_files",
+    "extras",
     "typing",
     "arguments",
     "timing",

@@ -223,7 +223,7 @@ def served(robot, controller="WHOLE_BODY_IK", host="127.0.0.1"):
     )
     session = TeleopSession(env, period=1 / RATE)
     for limb in session.limbs.values():  # a slow browser is not a frozen one
-        limb.ownership.timeout = PATIENCE
+        limb.hold_timeout = PATIENCE
     session._drive.timeout = PATIENCE
     page = TeleopPage(session, PageServer(host, port=0), label=f"{robot} · Lift")
     page.start()

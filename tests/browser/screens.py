@@ -47,7 +47,7 @@ def serve(benchmark, robots, path=None):
         control = EpisodeControl(env.recorder, seed=0)
     session = TeleopSession(env, period=1 / RATE, episode_control=control)
     for limb in session.limbs.values():  # a slow browser is not a frozen one
-        limb.ownership.timeout = 300.0
+        limb.hold_timeout = 300.0
     page = TeleopPage(session, PageServer(port=0), label=f"{robots} · {benchmark}")
     page.start()
     session.start()

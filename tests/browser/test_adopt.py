@@ -70,7 +70,7 @@ def test_a_mobile_manipulator_is_adopted(context, tmp_path):
         note(adopt_tiago_seconds=round(time.monotonic() - began, 1))
         viewer.screenshot("adopt_tiago")
     finally:
-        page.stop()
+        page.site.stop()
     assert "Next: wbc-suite teleop --robots" in text
     robot = wbc_suite.load_robot(next((tmp_path / "lab/robots").glob("*.toml")))
     assert robot.frame(name).pos == page.frames[name].pos != before
@@ -94,7 +94,7 @@ def test_a_humanoid_is_adopted_with_a_gait(context, tmp_path):
         note(adopt_g1_seconds=round(time.monotonic() - began, 1))
         viewer.screenshot("adopt_g1")
     finally:
-        page.stop()
+        page.site.stop()
     checks = [line for line in text.splitlines() if line.startswith("Check: ")]
     assert all("it holds" in x or "_thumb_" in x for x in checks), text
     path = next((tmp_path / "lab/robots").glob("*.toml"))

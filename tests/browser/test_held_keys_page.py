@@ -2,9 +2,11 @@
 
 import threading
 
+import numpy as np
 import pytest
 from conftest import wait_until
 
+from wbc_suite.viewers.drive_panel import pad_html
 from wbc_suite.viewers.page_server import PageServer
 
 pytestmark = pytest.mark.browser
@@ -54,11 +56,15 @@ def listener():
 @pytest.fixture
 def page(context, listener):
     site = PageServer(port=0)
-    site.keys.listen(listener)
     page = context.new_page()
     page.add_init_script(SOCKETS)
     page.add_init_script(PAD)
-    page.goto(site.url)
+    page.goto(site.url)  # before there is a session, as in `wbc-suite teleop`
+    page.wait_for_selector("canvas")
+    page.keyboard.press("w")
+    assert not page.evaluate("sockets.some(s => s.url.endsWith('/held_keys'))")
+    site.server.gui.add_html(pad_html(np.ones(4)))
+    site.keys.listen(listener)
     wait_until(lambda: listener.axes == [0, 0, 0, 0], "the page connects, with zeros")
     yield page
     page.close()

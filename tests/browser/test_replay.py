@@ -36,7 +36,7 @@ def replayed(tmp_path):
         page = ReplayPage(player, again, PageServer(port=0), label="Replay · lift.hdf5")
         page.start()
         yield page
-        page.stop()
+        page.site.stop()
         again.close()
 
 

@@ -227,7 +227,7 @@ def test_closing_a_tab_gives_back_what_it_held(settled, context):
 @pytest.mark.parametrize("end", ENDS)
 def test_drag_whose_release_is_not_seen_ends(settled, context, monkeypatch, end):
     session, page = settled
-    monkeypatch.setattr(session.limbs[HAND].ownership, "timeout", np.inf)
+    monkeypatch.setattr(session.limbs[HAND], "hold_timeout", np.inf)
     viewer = Viewer(context, page.site)
     hold_and_drag(viewer, session, 40)
     viewer.page.evaluate(ENDS[end])

@@ -26,4 +26,4 @@ def test_buttons_and_toggles_change_what_is_seen(context):
         wait_until(lambda: all(s.visible for s in shapes), "collision shapes appear")
         viewer.screenshot("view_gr1")
     finally:
-        page.stop()
+        page.site.stop()

@@ -8,8 +8,11 @@ import pytest
 
 from wbc_suite.devices import DeviceState, LimbInput
 from wbc_suite.devices.pipeline.config import Leash, OneEuro, WorkspaceBox
-from wbc_suite.devices.pipeline.limb_pipeline import clip_to_box, clip_to_leash
-from wbc_suite.devices.pipeline.one_euro import OneEuroFilter
+from wbc_suite.devices.pipeline.limb_pipeline import (
+    OneEuroFilter,
+    clip_to_box,
+    clip_to_leash,
+)
 from wbc_suite.devices.pipeline.pipeline import LimbSelector
 from wbc_suite.devices.pipeline.watchdog import Phase, Watchdog
 from wbc_suite.devices.state import mirrored

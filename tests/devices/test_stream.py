@@ -19,7 +19,6 @@ from wbc_suite.devices.pose_frame import (
     Pose,
     PoseFrame,
     PoseLimb,
-    frame_schema,
 )
 from wbc_suite.devices.stream import SENDERS, Stream
 from wbc_suite.devices.stream_client import StreamClient
@@ -296,7 +295,7 @@ def test_nobody_there_is_a_plain_error():
 
 
 def test_schema_names_every_part_of_a_frame():
-    properties = frame_schema()["properties"]
+    properties = PoseFrame.model_json_schema()["properties"]
     assert set(properties) == {
         "format", "time", "limbs", "joints", "base", "height", "buttons",
     }  # fmt: skip

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from random_episodes import HEADER, make_episode
 
-from wbc_suite.cli import options
+from wbc_suite import atomic_files
 from wbc_suite.recording import Dataset, Store, editing
 from wbc_suite.recording.converting import convert
 from wbc_suite.robot import load_robot
@@ -36,7 +36,7 @@ def commands(source, out):
         "filter": lambda: editing.filter_dataset(source, out, lambda *_: True),
         "split": lambda: editing.split(source, valid=0.25),
         "repair": lambda: editing.repair(source),
-        "export": lambda: options.write_file(out, lambda p: p.write_text(PANDA)),
+        "export": lambda: atomic_files.write_bytes(out, PANDA.encode()),
     }
 
 

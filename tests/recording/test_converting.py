@@ -19,8 +19,7 @@ from wbc_suite.envs.states import motion_size
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.executors import Processes, Serial
 from wbc_suite.recording import Dataset, Store, editing, rebuild
-from wbc_suite.recording.converting import convert, lerobot
-from wbc_suite.recording.converting.conversion import convert_piece
+from wbc_suite.recording.converting import convert, convert_piece, lerobot
 from wbc_suite.recording.converting.layout import Piece
 from wbc_suite.recording.extracting import extract
 from wbc_suite.recording.replaying import divergence, play_states

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from random_episodes import HEADER, make_episode
 
+from wbc_suite import atomic_files
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording import Dataset, Store, atomic_files, editing
+from wbc_suite.recording import Dataset, Store, editing
 from wbc_suite.wrappers import DataCollection
 
 KILLS = int(os.environ.get("WBC_SUITE_KILLS", "4"))

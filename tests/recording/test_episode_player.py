@@ -7,8 +7,13 @@ import pytest
 
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import Dataset
-from wbc_suite.viewers.episode_player import PAUSE, Clip, EpisodePlayer, open_player
-from wbc_suite.viewers.replay_window import show_in_window
+from wbc_suite.viewers.episode_player import (
+    PAUSE,
+    Clip,
+    EpisodePlayer,
+    open_player,
+    show_in_window,
+)
 
 
 class Clock:
@@ -111,9 +116,9 @@ def test_a_window_shows_states_and_its_keys_wind(lift_recording, lift_env):
             seen.append(lift_env.physics_state.copy())
 
     @contextlib.contextmanager
-    def launch(model, data, press):
+    def launch(model, data, *, key_callback, **options):
         assert model is lift_env.simulation.model
-        yield Window(press)
+        yield Window(key_callback)
 
     with Dataset(lift_recording) as dataset:
         player = open_player(dataset, ["demo_1"], lift_env, by_states=True)

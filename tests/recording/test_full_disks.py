@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from random_episodes import HEADER, make_episode
 
+from wbc_suite import atomic_files
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording import Dataset, Store, atomic_files, episode_store, hdf5_writer
+from wbc_suite.recording import Dataset, Store, episode_store, hdf5_writer
 from wbc_suite.recording.hdf5_writer import open_late_errors
 from wbc_suite.recording.step_buffer import BLOCK_BYTES, RowBuffer
 

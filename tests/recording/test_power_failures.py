@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 from random_episodes import HEADER, make_episode
 
+from wbc_suite import atomic_files
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording import Dataset, Store, atomic_files
+from wbc_suite.recording import Dataset, Store
 from wbc_suite.recording.converting import convert
 
 

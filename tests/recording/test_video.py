@@ -10,15 +10,16 @@ from random_episodes import HEADER, make_episode
 
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import Dataset, Store, video
-from wbc_suite.recording.plots import HEIGHT, WIDTH, write_plots
-from wbc_suite.recording.video import (
+from wbc_suite.recording.plots import (
+    HEIGHT,
     LABEL,
     SHEET_COLUMNS,
     SHEET_SIZE,
-    check_video,
+    WIDTH,
+    write_plots,
     write_sheet,
-    write_video,
 )
+from wbc_suite.recording.video import check_video, write_video
 
 RED, BLUE = (250, 10, 10), (10, 10, 250)
 

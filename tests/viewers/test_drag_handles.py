@@ -82,7 +82,7 @@ def test_drag_moves_the_target_by_the_same_offset(session, handles, clients):
     target = session.snapshot.limbs[HAND].target.translation
     np.testing.assert_allclose(target - start, [0.0, 0.1, 0.05], atol=1e-12)
     clients[0].drag(HAND, "end")
-    assert session.limbs[HAND].ownership.holder(session._clock()) is None
+    assert session.limbs[HAND].holder(session._clock()) is None
 
 
 def test_quaternion_of_any_length_turns_the_target(session, clients):

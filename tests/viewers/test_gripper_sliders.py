@@ -44,7 +44,7 @@ def test_sliders_follow_a_device_and_a_reset(session, page):
 
 
 def test_slider_in_a_persons_hand_is_left_to_the_person(session, page, monkeypatch):
-    sliders = gripper_sliders.GripperSliders(page.server, session, GRIPPER)
+    sliders = gripper_sliders.GripperSliders(page.server.gui, session, GRIPPER)
     now = [100.0]
     monkeypatch.setattr(gripper_sliders.time, "monotonic", lambda: now[0])
     sliders.touch()

@@ -11,7 +11,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from wbc_suite.viewers.drive_panel import pad_html, velocity_html
-from wbc_suite.viewers.held_keys import SCRIPT, SOCKET, parse_axes
+from wbc_suite.viewers.held_keys import SOCKET, parse_axes
 from wbc_suite.viewers.page_server import PageServer
 
 PATIENCE = 30.0  # s, for a busy machine
@@ -60,12 +60,19 @@ def socket_of(site):
     return site.url.replace("http", "ws").rstrip("/") + SOCKET
 
 
-def test_script_comes_before_all_others_and_only_if_somebody_listens(site):
-    assert SCRIPT not in fetch(site.url)
-    site.keys.listen(Listener())
+def test_script_comes_before_all_others_and_is_served(site):
     page = fetch(site.url)
-    assert page.index(f'<script src="{SCRIPT}">') == page.index("<script")
-    assert "addEventListener" in fetch(site.url.rstrip("/") + SCRIPT)
+    assert page.index('<script src="/held_keys.js">') == page.index("<script")
+    assert "addEventListener" in fetch(site.url.rstrip("/") + "/held_keys.js")
+
+
+def test_client_is_disconnected_until_somebody_listens(site):
+    with connect(socket_of(site)) as socket, pytest.raises(ConnectionClosed):
+        socket.recv(timeout=PATIENCE)
+    site.keys.listen(listener := Listener())
+    with connect(socket_of(site)) as socket:
+        socket.send("[0, 0, 0, 0]")
+        assert listener.wait(1)[0][1] == [0, 0, 0, 0]
 
 
 def test_axes_arrive_and_a_client_that_goes_ends_its_motion(site, listener):

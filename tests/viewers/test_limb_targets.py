@@ -6,7 +6,7 @@ from wbc_suite.control.composite.frame_kinds import FRAME_KINDS as KINDS
 from wbc_suite.devices import PipelineConfig
 from wbc_suite.devices.action_ports import LimbKind, LimbPort
 from wbc_suite.devices.pipeline.limb_pipeline import LimbPipeline
-from wbc_suite.viewers.limb_targets import LimbTarget, Ownership
+from wbc_suite.viewers.limb_targets import LimbTarget
 from wbc_suite.viewers.session_state import LimbInfo
 
 FRAME_KINDS = {
@@ -30,26 +30,33 @@ def limb(name, kind, T):
         encode=lambda target: values(kind, target),
         decode=lambda values: T,
     )
-    return LimbTarget(LimbPipeline(port, PipelineConfig(), dt=0.01), Ownership())
+    return LimbTarget(LimbPipeline(port, PipelineConfig(), dt=0.01))
+
+
+def grabs(held, client, now):
+    return held.drag(client, pin.SE3.Identity(), now=now, grab=True)
 
 
 def test_first_client_keeps_it_until_release():
-    ownership = Ownership(timeout=10)
-    assert ownership.take(1, now=0.0)
-    assert not ownership.take(2, now=1.0)
-    assert not ownership.release(2)
-    assert ownership.holder(2.0) == 1
-    assert ownership.release(1)
-    assert ownership.take(2, now=3.0)
+    held = limb("hand", LimbKind.POSE, pin.SE3.Identity())
+    assert not held.drag(1, pin.SE3.Identity(), now=0.0)  # without grabbing it
+    assert grabs(held, 1, now=0.0)
+    assert not grabs(held, 2, now=1.0)
+    held.release(2)
+    assert held.holder(2.0) == 1
+    held.release(1)
+    assert held.holder(2.0) is None
+    assert grabs(held, 2, now=3.0)
 
 
 def test_silent_holder_loses_it_after_the_timeout():
-    ownership = Ownership(timeout=10)
-    ownership.take(1, now=0.0)
-    ownership.take(1, now=9.0)  # a sign of life
-    assert not ownership.take(2, now=18.0)
-    assert ownership.take(2, now=19.5)
-    assert not ownership.take(1, now=20.0)
+    held = limb("hand", LimbKind.POSE, pin.SE3.Identity())
+    held.hold_timeout = 10.0
+    assert grabs(held, 1, now=0.0)
+    assert held.drag(1, pin.SE3.Identity(), now=9.0)  # a sign of life
+    assert not grabs(held, 2, now=18.0)
+    assert grabs(held, 2, now=19.5)
+    assert not held.drag(1, pin.SE3.Identity(), now=20.0)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +152,7 @@ def test_a_target_stays_where_the_controller_reports_it_as_reached_or_it_is_held
     assert released.settle(1.0, report={"reached": True}) is None
     assert released.limb.rest is None
     held = Released(away=0.5)
-    assert held.limb.ownership.take(2, now=0.0)
+    assert held.limb.drag(2, held.place, now=0.0, grab=True)
     assert held.settle(1.0) is None
     assert Released(away=0.5).settle(1.0, report={"reached": False}) is not None
 
@@ -162,4 +169,4 @@ def test_a_target_stays_where_the_controller_reports_it_as_reached_or_it_is_held
 def test_poses_that_cannot_be_take_no_limb(T, valid):
     target = limb("x", LimbKind.POSE, pin.SE3.Identity())
     assert target.drag(1, T, now=0.0, grab=True) == valid
-    assert target.ownership.holder(0.0) == (1 if valid else None)
+    assert target.holder(0.0) == (1 if valid else None)

@@ -82,6 +82,8 @@ def test_robot_without_shapes_has_a_box_around_its_bodies():
     bare = """<mujoco><worldbody><body pos="0 0 1"><joint/>
     <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
     m = mujoco.MjModel.from_xml_string(bare)
-    low, high = robot_box(m, *posed(m, 0.0))
+    data = mujoco.MjData(m)
+    mujoco.mj_kinematics(m, data)
+    low, high = robot_box(m, data)
     assert (low < [0.0, 0.0, 1.0]).all()
     assert (high > [0.0, 0.0, 1.0]).all()

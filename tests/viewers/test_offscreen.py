@@ -4,6 +4,7 @@ import pytest
 
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.robot import load_robot
+from wbc_suite.viewers.model_scene import subject_corners
 from wbc_suite.viewers.offscreen import (
     VIEWS,
     Camera,
@@ -12,7 +13,6 @@ from wbc_suite.viewers.offscreen import (
     add_studio,
     render_model,
     render_robot,
-    subject_corners,
 )
 
 POLE = """<mujoco><worldbody><body pos="0 0 .5">

@@ -79,5 +79,4 @@ def test_messages_have_the_fields_of_viser():
     """A new version of viser that renames one would lock every page out."""
     for message in PAGES_SEND:
         theirs = getattr(viser_messages, message["type"]).__dataclass_fields__
-        ours = getattr(page_messages, message["type"]).__struct_fields__
-        assert set(ours) == set(theirs)
+        assert page_messages.FIELDS[message["type"]].keys() == set(theirs)

@@ -20,7 +20,8 @@ from websockets.typing import Subprotocol
 
 from wbc_suite.errors import DeviceError
 from wbc_suite.recording.episode_control import EpisodeCommand
-from wbc_suite.viewers.page_process import PageProcess, RemoteSession
+from wbc_suite.viewers.page_process import PageProcess
+from wbc_suite.viewers.remote_session import RemoteSession
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 PATIENCE = 120.0  # s

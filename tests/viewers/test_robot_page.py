@@ -11,7 +11,7 @@ from wbc_suite.viewers.robot_page import RobotPage, equivalent_box
 def page():
     page = RobotPage(wbc_suite.load_robot("Panda"), PageServer(port=0))
     yield page
-    page.stop()
+    page.site.stop()
 
 
 def test_page_opens_in_the_first_keyframe(page):

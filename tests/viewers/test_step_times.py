@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wbc_suite.viewers.step_times import StepTimes
+from wbc_suite.viewers.loop_timing import StepTimes
 
 
 def test_duration_is_that_of_the_step_and_not_its_period():

@@ -58,8 +58,5 @@ def adopt(
     logging.getLogger("wbc_suite").removeHandler(notes)
     said = [line.removeprefix(f"{file}: ") for line in notes.lines]
     site = PageServer(host, port)
-    page = AdoptPage(robot, site, notes=said, folder=output, say=print)
-    try:
-        options.serve_until_interrupted(site, f"Adopt {robot.name}")
-    finally:
-        page.stop()
+    AdoptPage(robot, site, notes=said, folder=output, say=print)
+    options.serve_until_interrupted(site, f"Adopt {robot.name}")

@@ -71,17 +71,9 @@ def _show_version(asked: bool) -> None:
 
 
 LOADS = (
-    "teleop",
-    "view",
-    "demo",
-    "adopt",
-    "record",
-    "multiply",
-    "replay",
-    "render",
-    "expert",
+    *("teleop", "view", "demo", "adopt", "record", "multiply", "replay", "render"),
+    *("expert", "evaluate", "serve-policy", "bench"),
 )
-LOADS += ("evaluate", "serve-policy", "bench")
 """Commands that import for a second before they have something to say."""
 
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv
     from wbc_suite.typing import Vector
 
-BLOCKS = 5
-RESETS, PICTURES = 20, 50
+BLOCKS = 5  # of steps, with a reset before each
+RESETS, PICTURES = 20, 50  # that are timed
 SHARE = 0.05  # of the way from what holds the robot to a random action
 
 
@@ -43,20 +43,19 @@ def bench(
     import numpy as np
 
     import wbc_suite
+    from wbc_suite.atomic_files import write_bytes
     from wbc_suite.envs import RobotEnv
     from wbc_suite.timing import time_frames
 
-    options.check_names(
-        benchmarks=[benchmark],
-        robots=options.robot_names(robots or ()),
-        controllers=[controller],
+    arguments = options.environment_arguments(
+        benchmark,
+        robots=robots,
+        controller=controller,
         gripper=gripper,
         base=base,
+        horizon=10**9,
     )
-    arguments = options.environment_arguments(
-        robots=robots, controller=controller, gripper=gripper, base=base
-    )
-    arguments |= {"control_freq": rate, "horizon": 10**9}
+    arguments |= {"control_freq": rate}
     env = wbc_suite.make(benchmark, **arguments).unwrapped
     assert isinstance(env, RobotEnv), "`make` made it"
     found = _times(env, actions)
@@ -70,7 +69,7 @@ def bench(
     _print_table(f"{benchmark}, {names}, {rate:g} Hz", found)
     if output is not None:
         text = json.dumps({"us": {k: times.tolist() for k, times in found.items()}})
-        options.write_file(output, lambda path: path.write_text(text + "\n", "utf-8"))
+        write_bytes(output, f"{text}\n".encode())
 
 
 def _times(env: "RobotEnv", actions: int) -> "dict[str, Vector]":

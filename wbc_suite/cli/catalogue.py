@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 
 import typer
 
-from wbc_suite.cli.options import (
-    CatalogueOption,
-    JsonOption,
-    MeshRootOption,
-    RootOption,
-    StrictOption,
-)
+from wbc_suite.cli import options
 from wbc_suite.cli.output import print
 from wbc_suite.errors import printable
 
@@ -29,8 +23,8 @@ def list_catalogue(
     kind: Annotated[
         Kind | None, typer.Argument(help="What to list; all by default.")
     ] = None,
-    as_json: JsonOption = False,
-    catalogue: CatalogueOption = None,
+    as_json: options.JsonOption = False,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """List robots, grippers, bases, benchmarks and controllers.
 
@@ -142,11 +136,11 @@ def check_file(
         str | None,
         typer.Option(metavar="ROBOT", help="Robot to check a controller for."),
     ] = None,
-    root: RootOption = None,
-    mesh_root: MeshRootOption = None,
-    strict: StrictOption = False,
-    as_json: JsonOption = False,
-    catalogue: CatalogueOption = None,
+    root: options.RootOption = None,
+    mesh_root: options.MeshRootOption = None,
+    strict: options.StrictOption = False,
+    as_json: options.JsonOption = False,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Check a robot, benchmark or controller file, and print a summary.
 
@@ -202,12 +196,12 @@ def _controls(file: Path, content: dict[str, Any]) -> bool:
     )
 
 
-def _robot(file: Path, **options: Any) -> tuple[str, dict[str, list[str]]]:
+def _robot(file: Path, **given: Any) -> tuple[str, dict[str, list[str]]]:
     """Return a summary of a robot, and what was inferred if its file is not ours."""
     from wbc_suite.envs.hold_check import hold_faults
     from wbc_suite.robot import load_robot
 
-    robot = load_robot(file, **options)
+    robot = load_robot(file, **given)
     for fault in hold_faults(robot) if file.suffix != ".toml" else ():
         print(f"Warning: {fault}", file=sys.stderr)
     simulated = robot.to_mjspec().compile()
@@ -244,8 +238,8 @@ def print_schema(
     ],
 ) -> None:
     """Print the JSON Schema of robot files, or of the frames that a stream takes."""
-    from wbc_suite.devices.pose_frame import frame_schema
+    from wbc_suite.devices.pose_frame import PoseFrame
     from wbc_suite.robot.robot_file import robot_schema
 
-    schema = frame_schema() if kind == "frame" else robot_schema(kind)
+    schema = PoseFrame.model_json_schema() if kind == "frame" else robot_schema(kind)
     print(json.dumps(schema, indent=2))

@@ -36,8 +36,7 @@ def inspect(
 ) -> None:
     """Show origin, lengths and success of episodes; write plots or a contact sheet."""
     from wbc_suite.recording import Dataset
-    from wbc_suite.recording.plots import write_plots
-    from wbc_suite.recording.video import write_sheet
+    from wbc_suite.recording.plots import write_plots, write_sheet
 
     with Dataset(file) as dataset:
         _print_origin(dataset)

@@ -50,9 +50,9 @@ def demo(
     """
     from PIL import Image
 
+    from wbc_suite.atomic_files import check_folder, replace_file
     from wbc_suite.control import load_composite_controller_config
     from wbc_suite.envs.hold_check import alone, hold_faults
-    from wbc_suite.recording.plots import save_picture
     from wbc_suite.recording.video import write_video
     from wbc_suite.robot import load_robot
 
@@ -69,7 +69,8 @@ def demo(
     for fault in hold_faults(loaded) if errors[-1].max() > LATE else ():
         print(f"  at `ready`: {fault}")
     still, film = output / "reach.png", output / "reach.gif"
-    save_picture(Image.fromarray(pictures[len(pictures) // 4]), still)
+    check_folder(output)
+    replace_file(still, Image.fromarray(pictures[len(pictures) // 4]).save)
     write_video(pictures, film, rate=FRAMES_PER_SECOND)
     print(f"Wrote {still} and {film}.")
 

@@ -7,7 +7,7 @@ import sys
 import time
 import timeit
 from collections.abc import Iterator, Sequence
-from dataclasses import KW_ONLY, asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib import metadata
 from typing import Annotated, Literal
 
@@ -57,7 +57,7 @@ def doctor(
     broken = 0
     if as_json:
         findings = [asdict(finding) for finding in diagnose()]
-        print(json.dumps([{k: f[k] for k in f if k != "_"} for f in findings]))
+        print(json.dumps(findings))
         raise typer.Exit(any(f["state"] == "broken" for f in findings))
     for finding in diagnose():
         print(f"{_MARKS[finding.state]}  {finding.topic:<11} {finding.text}")
@@ -93,9 +93,8 @@ class Finding:
 
     topic: str
     text: str
-    _: KW_ONLY
-    state: Literal["fine", "optional", "broken"] = "fine"
-    cure: str = ""
+    state: Literal["fine", "optional", "broken"] = field(default="fine", kw_only=True)
+    cure: str = field(default="", kw_only=True)
 
 
 def diagnose() -> Iterator[Finding]:

@@ -6,21 +6,12 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wbc_suite.cli.options import (
-    CatalogueOption,
-    ExecutorOption,
-    HostOption,
-    check_names,
-    progress,
-    robot_names,
-    write_file,
-)
+from wbc_suite.cli import options
 from wbc_suite.cli.output import print
 from wbc_suite.errors import printable
 
@@ -73,9 +64,6 @@ FirstSeedOption = Annotated[
     int | None,
     typer.Option(min=0, help="Use consecutive seeds from this one on."),
 ]
-HorizonOption = Annotated[
-    int | None, typer.Option(min=1, help="Maximum steps of an episode.")
-]
 StopOption = Annotated[
     bool, typer.Option("--stop/--no-stop", help="End an episode at its success.")
 ]
@@ -86,9 +74,6 @@ RecordOption = Annotated[
 OutputOption = Annotated[
     Path,
     typer.Option("--output", "-o", help="Folder of the results."),
-]
-WorkersOption = Annotated[
-    int | None, typer.Option(min=1, help="Workers; one per processor by default.")
 ]
 FilmsOption = Annotated[
     int, typer.Option(min=0, help="Failures of each case to film for the report.")
@@ -113,7 +98,7 @@ def evaluate(
     episodes: Annotated[int, typer.Option(min=1, help="Episodes per case.")] = 400,
     base_seed: BaseOption = 0,
     first_seed: FirstSeedOption = None,
-    horizon: HorizonOption = None,
+    horizon: options.HorizonOption = None,
     shaped: Annotated[bool, typer.Option(help="Shaped rewards.")] = False,
     stop: StopOption = True,
     record: RecordOption = False,
@@ -121,11 +106,11 @@ def evaluate(
     action_time: ActionTimeOption = 60.0,
     episode_time: EpisodeTimeOption = 3600.0,
     output: OutputOption = Path("artifacts/evaluation"),
-    executor: ExecutorOption = "process",
-    workers: WorkersOption = None,
+    executor: options.ExecutorOption = "process",
+    workers: options.WorkersOption = None,
     chunk: Annotated[int, typer.Option(min=1, help="Episodes per work item.")] = 10,
     as_json: JsonOption = False,
-    catalogue: CatalogueOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Run many episodes and report success rates; a stopped command can continue.
 
@@ -135,8 +120,7 @@ def evaluate(
     wbc-suite evaluate Lift Door --robots Panda --robots UR5e --policy my_module:Policy
     """
     from wbc_suite.evaluation import episode_seeds, plan_rollouts, run_rollouts
-    from wbc_suite.evaluation.films import film_failures
-    from wbc_suite.evaluation.results import collect
+    from wbc_suite.evaluation.results import collect, film_failures
     from wbc_suite.evaluation.rollouts import prepare_rollouts
     from wbc_suite.executors import Processes, make_executor, run_items
 
@@ -161,7 +145,9 @@ def evaluate(
     if isinstance(runner, Processes) and not any(":" in n for n in policy + benchmarks):
         runner.prepare = prepare_rollouts  # a module of a user's may hold a GPU
     every = [item for mine in items.values() for item in mine]
-    with progress("Episodes", sum(len(i.payload["seeds"]) for i in every)) as advance:
+    with options.progress(
+        "Episodes", sum(len(i.payload["seeds"]) for i in every)
+    ) as advance:
         outcomes = run_items(
             run_rollouts,
             every,
@@ -181,7 +167,7 @@ def serve_policy(
         str, typer.Argument(help="expert, random, hold, module:Name or FILE.hdf5.")
     ],
     *,
-    host: HostOption = "127.0.0.1",
+    host: options.HostOption = "127.0.0.1",
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port; 0 for any free one.")
     ] = 5555,
@@ -200,7 +186,7 @@ def serve_policy(
     """
     from wbc_suite.evaluation import PolicyServer, replicate
 
-    check_names(policies=[policy])
+    options.check_names(policies=[policy])
     begin = replicate(policy, trust_files=trust_files)
     with PolicyServer(begin, host=host, port=port, connections=connections) as server:
         print(f"{policy}: {server.address}\nPress Ctrl-C to stop.", flush=True)
@@ -234,9 +220,9 @@ def _cases(
     changes = ["" if name == "none" else name for name in perturb or ["none"]]
     for name in filter(None, changes):
         PERTURBATIONS.find(name)
-    check_names(
+    options.check_names(
         benchmarks=benchmarks,
-        robots=sorted({*robot_names(robots)}),
+        robots=sorted({*options.robot_names(robots)}),
         controllers=controllers or (),
         policies=policies,
     )
@@ -263,6 +249,7 @@ def _cases(
 
 def _report(results: "Results", output: Path, *, as_json: bool) -> None:
     """Print figures and write the files; fail when an item failed."""
+    from wbc_suite.atomic_files import write_bytes
     from wbc_suite.evaluation.report import report_page
 
     figures = results.figures()
@@ -272,7 +259,7 @@ def _report(results: "Results", output: Path, *, as_json: bool) -> None:
         "report.html": report_page(results, " ".join(["wbc-suite", *sys.argv[1:]])),
     }
     for name, text in files.items():
-        write_file(output / name, partial(Path.write_text, data=text, encoding="utf-8"))
+        write_bytes(output / name, text.encode())
     if as_json:
         print(json.dumps(figures, indent=1))
     else:

@@ -20,9 +20,7 @@ def expert(
     controller: options.ControllerOption = None,
     episodes: Annotated[int, typer.Option(min=1, help="Number of episodes.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode.")] = 0,
-    horizon: Annotated[
-        int | None, typer.Option(min=1, help="Maximum steps of an episode.")
-    ] = None,
+    horizon: options.HorizonOption = None,
     view: Annotated[
         bool, typer.Option("--view", help="Show it in the browser, in real time.")
     ] = False,
@@ -40,19 +38,15 @@ def expert(
     from wbc_suite.evaluation import summarise
     from wbc_suite.evaluation.rollouts import run_episode
 
-    options.check_names(
-        benchmarks=[benchmark],
-        robots=options.robot_names(robots or ()),
-        controllers=[controller],
-        policies=["expert"],
+    arguments = options.environment_arguments(
+        benchmark,
+        robots=robots,
+        controller=controller,
         gripper=gripper,
         base=base,
+        horizon=horizon,
+        policies=["expert"],
     )
-    arguments = options.environment_arguments(
-        robots=robots, controller=controller, gripper=gripper, base=base
-    )
-    if horizon is not None:
-        arguments["horizon"] = horizon
     if view:
         arguments["render_mode"] = "human"
     env = wbc_suite.make(benchmark, terminate_on_success=True, **arguments)

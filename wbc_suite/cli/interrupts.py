@@ -21,10 +21,11 @@ from typing import NoReturn
 GRACE = 0.7  # s, for cleaning up
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 KEPT = {
-    "record": "Finished episodes are kept; run the same command to continue.",
-    "multiply": "Finished episodes are kept; run the same command to continue.",
+    **dict.fromkeys(
+        ("record", "multiply", "evaluate"),
+        "Finished episodes are kept; run the same command to continue.",
+    ),
     "teleop": "Finished episodes are kept; --record with the same file adds more.",
-    "evaluate": "Finished episodes are kept; run the same command to continue.",
     "extract": "Finished parts are kept; run the same command to continue.",
     "convert": "Run the same command to continue with --executor process, ray or "
     "slurm, which keeps finished parts; without one it starts again.",

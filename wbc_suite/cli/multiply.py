@@ -1,18 +1,11 @@
 """`wbc-suite multiply`: many demonstrations from few."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from wbc_suite.cli import options
-from wbc_suite.cli.record import (
-    HorizonOption,
-    NextObsOption,
-    NoiseOption,
-    OutOption,
-    WorkersOption,
-    record_policy,
-)
+from wbc_suite.cli.record import NextObsOption, NoiseOption, OutOption, record_policy
 
 OF_ROBOTS = ("robots", "controller_configs", "gripper_types", "base_types")
 
@@ -30,12 +23,12 @@ def multiply(
         str | None,
         typer.Option(help="Variant of the benchmark, by name or file."),
     ] = None,
-    horizon: HorizonOption = None,
+    horizon: options.HorizonOption = None,
     noise: NoiseOption = 0.05,
     seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 100_000,
     next_obs: NextObsOption = False,
     executor: options.ExecutorOption = "process",
-    workers: WorkersOption = None,
+    workers: options.WorkersOption = None,
     trust_files: options.TrustFilesOption = False,
     catalogue: options.CatalogueOption = None,
 ) -> None:
@@ -57,22 +50,18 @@ def multiply(
         source = EnvSource.parse(str(dataset.header.get("env_args", "")))
         env = rebuild(dataset, trust_files=trust_files)  # refuses what must not be made
         env.close()
-    given: dict[str, Any] = options.environment_arguments(
-        robots=robots, controller=controller, gripper=gripper, base=base
-    )
-    asked, own = benchmark or source.benchmark, source.arguments.get("robots", [])
-    options.check_names(
-        benchmarks=[asked],
-        robots=options.robot_names(robots or ([own] if isinstance(own, str) else own)),
-        controllers=[controller],
-        gripper=gripper,
-        base=base,
-    )
-    recorded = dict(source.arguments)
+    asked, recorded = benchmark or source.benchmark, dict(source.arguments)
     if robots:
         recorded = {k: v for k, v in recorded.items() if k not in OF_ROBOTS}
-    if horizon:
-        given["horizon"] = horizon
+    own = recorded.get("robots", [])
+    given = options.environment_arguments(
+        asked,
+        robots=robots or ([own] if isinstance(own, str) else own),
+        controller=controller,
+        gripper=gripper,
+        base=base,
+        horizon=horizon,
+    )
     plan = Plan(
         benchmark=asked,
         arguments=recorded | given | {"terminate_on_success": True},

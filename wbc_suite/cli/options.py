@@ -12,7 +12,7 @@ import typer
 
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE
 from wbc_suite.cli.output import print
-from wbc_suite.errors import ConfigError, WbcError
+from wbc_suite.errors import ConfigError
 
 if TYPE_CHECKING:
     from wbc_suite.viewers.page_process import PageProcess
@@ -87,6 +87,12 @@ TrustFilesOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+HorizonOption = Annotated[
+    int | None, typer.Option(min=1, help="Maximum actions of an episode.")
+]
+WorkersOption = Annotated[
+    int | None, typer.Option(min=1, help="Workers; one per processor by default.")
+]
 DeviceOptions = Annotated[
     list[str] | None,
     typer.Option(
@@ -118,9 +124,9 @@ PortOption = Annotated[
 ]
 
 
-def robot_names(given: Sequence[str]) -> list[str]:
+def robot_names(given: Sequence[str] | None) -> list[str]:
     """Return the robots of an option that is repeated, or has commas."""
-    return [name.strip() for names in given for name in names.split(",")]
+    return [name.strip() for names in given or () for name in names.split(",")]
 
 
 def check_names(
@@ -188,15 +194,29 @@ def chosen(gripper: str | None) -> str | dict[str, str] | None:
 
 
 def environment_arguments(
+    benchmark: str,
     *,
-    robots: list[str] | None,
-    controller: str | dict[str, Any] | None,
+    robots: Sequence[str] | None,
+    controller: str | None,
     gripper: str | None,
     base: str | None,
+    horizon: int | None = None,
+    policies: Sequence[str] = (),
+    devices: Collection[str] = (),
 ) -> dict[str, Any]:
-    """Return the arguments of `make` for the options that are given."""
-    names = robot_names(robots or ())
+    """Return the arguments of `make` for the options that are given, once checked."""
+    names = robot_names(robots)
+    check_names(
+        benchmarks=[benchmark],
+        robots=names,
+        controllers=[controller],
+        policies=policies,
+        devices=devices,
+        gripper=gripper,
+        base=base,
+    )
     arguments: dict[str, Any] = {
+        "horizon": horizon,
         "robots": names[0] if len(names) == 1 else names,
         "controller_configs": controller,
         "gripper_types": chosen(gripper),
@@ -229,18 +249,6 @@ def device_options(pairs: list[str] | None) -> dict[str, object]:
         except tomllib.TOMLDecodeError:
             options[name] = value
     return options
-
-
-def write_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` write a file, whole or not at all; raises a WbcError."""
-    from wbc_suite.recording.atomic_files import replace_file
-
-    try:
-        replace_file(path, write)
-    except WbcError:
-        raise
-    except ValueError as error:  # Pillow: an unknown suffix
-        raise ConfigError(f"'{path}' cannot be written: {error}.") from error
 
 
 @contextmanager
@@ -284,8 +292,11 @@ def print_address(site: "PageServer | PageProcess") -> None:
 
 
 def serve_until_interrupted(site: "PageServer", title: str) -> None:
-    """Print the address of a page, and wait for ever."""
+    """Print the address of a page, and serve it until Ctrl-C."""
     print(title)
     print_address(site)
     print("Press Ctrl-C to stop.", flush=True)
-    threading.Event().wait()
+    try:
+        threading.Event().wait()
+    finally:
+        site.stop()

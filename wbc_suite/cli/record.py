@@ -1,8 +1,6 @@
 """`wbc-suite record`: demonstrations into a file."""
 
 import sys
-from collections.abc import Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,21 +8,10 @@ import typer
 
 from wbc_suite.cli import options
 from wbc_suite.cli.output import print
-from wbc_suite.cli.teleop import (
-    ONE_DAY,
-    default_controller,
-    device_maker,
-    drive,
-    page_title,
-    served_page,
-    stages_of,
-)
+from wbc_suite.cli.teleop import ONE_DAY, run_session
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from wbc_suite.evaluation.generation import Plan
-    from wbc_suite.recording.episode_control import RecordingPlan
 
 BY_POLICY, BY_HAND = 20.0, 100.0  # Hz; an operator notices a latency of 50 ms
 SHOWN = 10  # episodes without success
@@ -40,9 +27,6 @@ PolicyOption = Annotated[
         "module:function; or an input device: headset, keyboard, stream, spacemouse, "
         "gamepad or dualsense (move while L1 is held), mjgui or your own module:Class."
     ),
-]
-HorizonOption = Annotated[
-    int | None, typer.Option(min=1, help="Maximum actions of an episode.")
 ]
 RateOption = Annotated[
     float | None,
@@ -71,9 +55,6 @@ RecoveriesOption = Annotated[
         "corrects; marked as `disturbed`.",
     ),
 ]
-WorkersOption = Annotated[
-    int | None, typer.Option(min=1, help="Workers; one per processor by default.")
-]
 PageOption = Annotated[bool, typer.Option(help="Serve a page that shows the scene.")]
 
 
@@ -85,7 +66,7 @@ def record(
     device: PolicyOption = "expert",
     episodes: Annotated[int, typer.Option(min=1, help="Episodes to keep.")] = 10,
     controller: options.ControllerOption = None,
-    horizon: HorizonOption = None,
+    horizon: options.HorizonOption = None,
     rate: RateOption = None,
     seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
     only_success: OnlySuccessOption = False,
@@ -93,7 +74,7 @@ def record(
     noise: NoiseOption = 0.0,
     recoveries: RecoveriesOption = 0.0,
     executor: options.ExecutorOption = "process",
-    workers: WorkersOption = None,
+    workers: options.WorkersOption = None,
     camera: options.CamerasOption = None,
     size: options.PictureSizeOption = 84,
     device_option: options.DeviceOptions = None,
@@ -118,42 +99,46 @@ def record(
     from wbc_suite.recording.episode_control import RecordingPlan
 
     by_hand = is_device(device)
-    options.check_names(
-        benchmarks=[benchmark],
-        robots=options.robot_names(robots or ()),
-        controllers=[controller],
-        policies=[] if by_hand else [device],
-        devices=DEVICES,
+    rate = rate or (BY_HAND if by_hand else BY_POLICY)
+    arguments = options.environment_arguments(
+        benchmark,
+        robots=robots,
+        controller=controller,
         gripper=gripper,
         base=base,
-    )
-    named = options.robot_names(robots or load_benchmark(benchmark).robots)
-    rate = rate or (BY_HAND if by_hand else BY_POLICY)
-    controller = controller or (default_controller(*named) if by_hand else None)
-    arguments = options.environment_arguments(
-        robots=robots, controller=controller, gripper=gripper, base=base
+        horizon=round(ONE_DAY * rate) if by_hand else horizon,
+        policies=[] if by_hand else [device],
+        devices=DEVICES,
     )
     arguments |= options.camera_arguments(camera, size)
-    arguments |= _timing(rate, horizon, by_hand=by_hand)
+    arguments |= {"control_freq": rate, "terminate_on_success": not by_hand}
     common: dict[str, Any] = {"benchmark": benchmark, "arguments": arguments}
     if not by_hand:
-        kept: dict[str, Any] = {"only_success": only_success, "next_obs": next_obs}
-        disturbed: dict[str, Any] = {"noise": noise, "pushes": recoveries}
-        plan = Plan(**common, policy=device, **kept, **disturbed)
+        plan = Plan(
+            **common,
+            policy=device,
+            only_success=only_success,
+            next_obs=next_obs,
+            noise=noise,
+            pushes=recoveries,
+        )
         record_policy(plan, out, episodes, seed, executor=executor, workers=workers)
         return
-    _record_by_hand(
-        out,
-        RecordingPlan(episodes=episodes, horizon=horizon, only_success=only_success),
+    kept = run_session(
         **common,
-        device=device_maker(device, device_option),
-        next_obs=next_obs,
-        robots=named,
-        rate=rate,
-        seed=seed,
+        robots=options.robot_names(robots or load_benchmark(benchmark).robots),
         address=(host, port) if page else None,
-        stages=stages_of(device, scale=scale, mirror=mirror),
+        device=device,
+        device_options=device_option,
+        stages={"scale": scale, "mirror": mirror},
+        seed=seed,
+        out=out,
+        next_obs=next_obs,
+        plan=RecordingPlan(
+            episodes=episodes, horizon=horizon, only_success=only_success
+        ),
     )
+    print(f"{out}: {kept} episodes.")
 
 
 def record_policy(
@@ -193,51 +178,3 @@ def record_policy(
     )
     if found.kept < episodes:
         print(f"Too few successes: kept {found.kept} of {episodes}.", file=sys.stderr)
-
-
-def _timing(rate: float, horizon: int | None, *, by_hand: bool) -> dict[str, Any]:
-    """Return the arguments of `make` that say how fast and how long episodes are."""
-    timing: dict[str, Any] = {"control_freq": rate, "terminate_on_success": not by_hand}
-    if horizon or by_hand:
-        timing["horizon"] = round(ONE_DAY * rate) if by_hand else horizon
-    return timing
-
-
-def _record_by_hand(
-    out: Path,
-    plan: "RecordingPlan",
-    *,
-    benchmark: str,
-    robots: Sequence[str],
-    arguments: dict[str, Any],
-    address: tuple[str, int | None] | None,
-    device: "Callable[[Any], Any]",
-    next_obs: bool,
-    seed: int,
-    **driving: Any,
-) -> None:
-    """Record what an operator does; `driving` are arguments of `drive`."""
-    import wbc_suite
-    from wbc_suite.recording.episode_control import EpisodeControl
-    from wbc_suite.wrappers import DataCollection
-
-    with served_page(address, robots, benchmark) as page:
-        env = wbc_suite.make(benchmark, **arguments)
-        collected = DataCollection(env, out, automatic=False, next_obs=next_obs)
-        with closing(collected):
-            drive(
-                collected,
-                page,
-                title=page_title(robots, benchmark),
-                seed=seed,
-                device=device(env),
-                episode_control=EpisodeControl(
-                    collected.recorder, seed=seed, plan=plan, report=_print_message
-                ),
-                **driving,
-            )
-    print(f"{out}: {collected.recorder.kept} episodes.")
-
-
-def _print_message(message: str) -> None:
-    print(f"  {message}", flush=True)

@@ -12,7 +12,6 @@ from wbc_suite.cli.output import print
 if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv
     from wbc_suite.recording import Episode
-    from wbc_suite.viewers.episode_player import EpisodePlayer
 
 
 def replay(
@@ -41,8 +40,9 @@ def replay(
     """Replay episodes, and report whether they match the recording bit for bit."""
     from wbc_suite.recording import Dataset, rebuild
     from wbc_suite.recording.video import check_video
-    from wbc_suite.viewers.episode_player import open_player
-    from wbc_suite.viewers.replay_window import show_in_window
+    from wbc_suite.viewers.episode_player import open_player, show_in_window
+    from wbc_suite.viewers.page_server import PageServer
+    from wbc_suite.viewers.replay_page import ReplayPage
 
     shown, by_states = {}, by == "states"
     if film is not None:
@@ -58,7 +58,9 @@ def replay(
                 if show == "screen":
                     show_in_window(player, env)
                 else:
-                    _show(player, env, file, host, port)
+                    site = PageServer(host, port)
+                    ReplayPage(player, env, site, label=f"Replay · {file.name}").start()
+                    options.serve_until_interrupted(site, f"Replay of {file}:")
                 return
             played = map(dataset.episode, options.tracked(names, "Replaying"))
             exact = [_play(env, episode, by_states=by_states) for episode in played]
@@ -69,22 +71,6 @@ def replay(
             env.close()
     if not by_states:
         print(f"{sum(exact)} of {len(exact)} episodes replay bit for bit.")
-
-
-def _show(
-    player: "EpisodePlayer", env: "RobotEnv", file: Path, host: str, port: int | None
-) -> None:
-    """Show episodes in a page until the user ends it."""
-    from wbc_suite.viewers.page_server import PageServer
-    from wbc_suite.viewers.replay_page import ReplayPage
-
-    site = PageServer(host, port)
-    page = ReplayPage(player, env, site, label=f"Replay · {file.name}")
-    page.start()
-    try:
-        options.serve_until_interrupted(page.site, f"Replay of {file}:")
-    finally:
-        page.stop()
 
 
 def _play(env: "RobotEnv", episode: "Episode", *, by_states: bool) -> bool:

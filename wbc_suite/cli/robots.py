@@ -37,10 +37,7 @@ def view(
     )
     page = RobotPage(description, PageServer(host, port))
     title = description.title or description.name
-    try:
-        options.serve_until_interrupted(page.site, title)
-    finally:
-        page.stop()
+    options.serve_until_interrupted(page.site, title)
 
 
 def render(
@@ -62,6 +59,7 @@ def render(
     """Draw a robot in the studio, without a display."""
     from PIL import Image
 
+    from wbc_suite.atomic_files import replace_file
     from wbc_suite.robot import load_robot
     from wbc_suite.viewers.offscreen import render_robot
 
@@ -71,7 +69,7 @@ def render(
         keyframe=keyframe,
         size=(width, height),
     )
-    options.write_file(output, Image.fromarray(picture).save)
+    replace_file(output, Image.fromarray(picture).save)
     print(f"Wrote {output}.")
 
 
@@ -95,6 +93,7 @@ def export_robot(
 
     A URDF gets a folder with meshes beside it for shapes that URDF lacks.
     """
+    from wbc_suite.atomic_files import write_bytes
     from wbc_suite.robot import load_robot
 
     description = load_robot(
@@ -114,7 +113,7 @@ def export_robot(
         text = description.to_urdf(mesh_dir=meshes)
     else:
         text = getattr(description, f"to_{to}")()
-    options.write_file(output, lambda path: path.write_text(text, encoding="utf-8"))
+    write_bytes(output, text.encode())
     print(f"Wrote {output} ({len(text) / 1000:.0f} kB).")
 
 

@@ -1,37 +1,21 @@
-"""`wbc-suite teleop`, and what `record` shares with it: device, page, session."""
+"""`wbc-suite teleop`, and the session of an operator, which `record` has too."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wbc_suite.cli.options import (
-    BaseOption,
-    CatalogueOption,
-    DeviceOptions,
-    GripperOption,
-    HostOption,
-    MirrorOption,
-    PortOption,
-    RobotsOption,
-    ScaleOption,
-    SkinOption,
-    check_names,
-    chosen,
-    device_options,
-    print_address,
-    robot_names,
-)
+from wbc_suite.cli import options
 from wbc_suite.cli.output import print
 
 if TYPE_CHECKING:
     import gymnasium
 
     from wbc_suite.devices import Device, PipelineConfig
-    from wbc_suite.recording.episode_control import EpisodeControl
+    from wbc_suite.recording.episode_control import RecordingPlan
     from wbc_suite.viewers.page_process import PageProcess
 
 ONE_DAY = 86_400  # s; horizon of a session, in place of the benchmark's
@@ -78,88 +62,132 @@ RecordOption = Annotated[
 def teleop(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to run.")] = "Lift",
     others: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
-    robots: RobotsOption = None,
+    robots: options.RobotsOption = None,
     controller: WholeBodyOption = None,
     rate: TargetRateOption = 100.0,
-    gripper: GripperOption = None,
-    base: BaseOption = None,
-    skin: SkinOption = None,
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    skin: options.SkinOption = None,
     seed: Annotated[int, typer.Option(help="Seed of the scene.")] = 0,
-    host: HostOption = "127.0.0.1",
-    port: PortOption = None,
+    host: options.HostOption = "127.0.0.1",
+    port: options.PortOption = None,
     device: DeviceOption = None,
-    device_option: DeviceOptions = None,
+    device_option: options.DeviceOptions = None,
     tls_cert: TlsCertOption = None,
     tls_key: TlsKeyOption = None,
-    scale: ScaleOption = 1.0,
-    mirror: MirrorOption = False,
+    scale: options.ScaleOption = 1.0,
+    mirror: options.MirrorOption = False,
     record: RecordOption = None,
-    catalogue: CatalogueOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Move a robot's hands, head, feet and base in a web page, or let it walk."""
+    names = options.robot_names([*(robots or ["GR1"]), *(others or ())])
+    arguments = options.environment_arguments(
+        benchmark,
+        robots=names,
+        controller=controller,
+        gripper=gripper,
+        base=base,
+        horizon=round(ONE_DAY * rate),
+    )
+    arguments |= {"skin": skin, "control_freq": rate}
+    tls = {"tls_cert": tls_cert, "tls_key": tls_key}
+    pairs = [f"{name}={json.dumps(str(path))}" for name, path in tls.items() if path]
+    run_session(
+        benchmark,
+        arguments,
+        robots=names,
+        address=(host, port),
+        device=device,
+        device_options=[*(device_option or ()), *pairs],
+        stages={"scale": scale, "mirror": mirror},
+        seed=seed,
+        out=record,
+    )
+
+
+def run_session(
+    benchmark: str,
+    arguments: dict[str, Any],
+    *,
+    robots: Sequence[str],
+    address: tuple[str, int | None] | None,
+    device: str | None,
+    device_options: list[str] | None,
+    stages: Mapping[str, Any],
+    seed: int,
+    out: Path | None = None,
+    next_obs: bool = False,
+    plan: "RecordingPlan | None" = None,
+) -> int:
+    """Let an operator act until the session is ended, or its plan is recorded.
+
+    Args:
+        benchmark: Name or file.
+        arguments: Those of `make`; without a controller, `default_controller`. The
+            page is up before the environment is made.
+        robots: Names or files.
+        address: Host and port of the page; None for a device alone.
+        device: Name of a device beside the page.
+        device_options: Its options, `NAME=VALUE`.
+        stages: Changes of the pipeline's settings.
+        seed: Seed of every reset but those of recordings.
+        out: File for recorded episodes.
+        next_obs: See `Recorder`.
+        plan: What is recorded; None for what the operator asks for.
+
+    Returns:
+        Number of episodes in the file.
+    """
     import wbc_suite
     from wbc_suite.recording.episode_control import EpisodeControl
     from wbc_suite.wrappers import DataCollection
 
-    names = robot_names([*(robots or ["GR1"]), *(others or ())])
-    check_names(
-        benchmarks=[benchmark],
-        robots=names,
-        controllers=[controller],
-        gripper=gripper,
-        base=base,
-    )
-    pairs = [*(device_option or []), *tls_options(tls_cert, tls_key)]
-    with served_page((host, port), names, benchmark) as page:
-        make = None if device is None else device_maker(device, pairs)
-        arguments = {"robots": names, "gripper_types": chosen(gripper)}
-        arguments |= {"base_types": base, "skin": skin, "control_freq": rate}
-        arguments |= {"horizon": round(ONE_DAY * rate)}
-        arguments |= {"controller_configs": controller or default_controller(*names)}
+    title = f"{' and '.join(robots)} · {benchmark}"
+    with _served_page(address, robots[0], title) as page:
+        make = device and device_maker(device, device_options)
+        if "controller_configs" not in arguments:
+            arguments["controller_configs"] = default_controller(*robots)
         if page is not None:
             page.check()
         env: gymnasium.Env[Any, Any] = wbc_suite.make(benchmark, **arguments)
-        episode_control = None
-        chosen_device = None if make is None else make(env)
-        if record is not None:
-            env = collection = DataCollection(env, record, automatic=False)
-            episode_control = EpisodeControl(collection.recorder, seed=seed)
+        used, control = make(env) if make else None, None
+        if out is not None:
+            env = collected = DataCollection(
+                env, out, automatic=False, next_obs=next_obs
+            )
+            control = EpisodeControl(
+                collected.recorder,
+                seed=seed,
+                plan=plan,
+                report=lambda text: print(f"  {text}", flush=True),
+            )
         with closing(env):
-            drive(
+            _drive(
                 env,
                 page,
-                title=page_title(names, benchmark),
-                rate=rate,
+                title,
+                device=used,
+                period=1.0 / arguments["control_freq"],
                 seed=seed,
-                device=chosen_device,
-                stages=stages_of(device, scale=scale, mirror=mirror),
-                episode_control=episode_control,
+                pipeline=stages_of(device, **stages),
+                episode_control=control,
             )
-
-
-def page_title(robots: Sequence[str], benchmark: str) -> str:
-    """Return the title of a page."""
-    return f"{' and '.join(robots)} · {benchmark}"
+    return control.status.kept if control else 0
 
 
 @contextmanager
-def served_page(
-    address: tuple[str, int | None] | None, robots: Sequence[str], benchmark: str
+def _served_page(
+    address: tuple[str, int | None] | None, robot: str, title: str
 ) -> Iterator["PageProcess | None"]:
-    """Serve a page, or none, which shows the first robot until `drive` takes over.
-
-    Args:
-        address: Host and port; None for no page.
-        robots: Names or files.
-        benchmark: For the title.
-    """
+    """Serve a page, if it has an address; it shows a robot until there is a session."""
     from wbc_suite.viewers.page_process import PageProcess
 
-    page, title = None, page_title(robots, benchmark)
+    page = None
     print(f"{title}: getting ready ...", flush=True)
     if address is not None:
         page = PageProcess(
-            *address, label=title, robot=robots[0], on_open=print_address
+            *address, label=title, robot=robot, on_open=options.print_address
         )
     try:
         yield page
@@ -182,24 +210,18 @@ def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
     """Return a function that makes a device with options `NAME=VALUE`."""
     from wbc_suite.devices import DEVICES
 
-    make, options = DEVICES.find(name), device_options(pairs)
+    make, given = DEVICES.find(name), options.device_options(pairs)
 
     def build(env: "gymnasium.Env[Any, Any]") -> "Device":
         if name.lower() == "mjgui":
-            options["env"] = env  # it shows the scene
+            given["env"] = env  # it shows the scene
         layout = env.unwrapped.action_layout  # type: ignore[attr-defined]
         walks = any(part.name.endswith("walk") for part in layout.slices)
         if walks and name.lower() in DRIVING:
-            options.setdefault("drives", True)
-        return make(**options)
+            given.setdefault("drives", True)
+        return make(**given)
 
     return build
-
-
-def tls_options(cert: Path | None, key: Path | None) -> list[str]:
-    """Return the options of a device for `--tls-cert` and `--tls-key`."""
-    given = {"tls_cert": cert, "tls_key": key}
-    return [f"{name}={json.dumps(str(path))}" for name, path in given.items() if path]
 
 
 def stages_of(device: str | None, *, scale: float, mirror: bool) -> "PipelineConfig":
@@ -212,43 +234,22 @@ def stages_of(device: str | None, *, scale: float, mirror: bool) -> "PipelineCon
     return stages.model_copy(update={"mirror": mirror, "scale": scale})
 
 
-def drive(
+def _drive(
     env: "gymnasium.Env[Any, Any]",
     page: "PageProcess | None",
-    *,
     title: str,
-    rate: float,
-    seed: int,
+    *,
     device: "Device | None",
-    stages: "PipelineConfig",
-    episode_control: "EpisodeControl | None",
+    **session_arguments: Any,
 ) -> None:
-    """Run a session until it is ended, or all planned episodes are recorded.
-
-    Args:
-        env: Environment, made; the caller closes it.
-        page: Page of the session, which the caller stops; None for a device alone.
-        title: Names of the robots and of the benchmark.
-        rate: Actions per second, Hz.
-        seed: Seed of every reset but those of recordings.
-        device: A device beside the page.
-        stages: Stages between inputs and the controller.
-        episode_control: Starts and ends recorded episodes.
-    """
+    """Run a session with a device until it is ended; see `TeleopSession`."""
     from wbc_suite.devices.headset import Headset
     from wbc_suite.viewers.headset_view import SessionView
     from wbc_suite.viewers.loop_timing import prepare_interpreter
     from wbc_suite.viewers.status_text import timing_text
     from wbc_suite.viewers.teleop_session import TeleopSession
 
-    session = TeleopSession(
-        env,
-        period=1.0 / rate,
-        seed=seed,
-        device=device,
-        pipeline=stages,
-        episode_control=episode_control,
-    )
+    session = TeleopSession(env, device=device, **session_arguments)
     try:
         if device is not None:
             device.start()

@@ -122,13 +122,9 @@ def pad_state(
 ) -> DeviceState:
     """Return velocities of the selected hand and the base, zero without `ENABLE`.
 
-    While r1 is held the right stick rolls the hand in place of yawing it.
-
-    Args:
-        time: s.
-        pad: State of the gamepad.
-        pressed: Buttons that were pressed since the last state.
-        drives: Whether the sticks drive the robot; else they move the hand.
+    While r1 is held the right stick rolls the hand in place of yawing it. `pressed` are
+    the buttons that were pressed since the last state. If it `drives`, the sticks drive
+    the robot, and else they move the hand.
     """
     buttons = frozenset(BUTTONS[n] for n in (pad.down | pressed) & BUTTONS.keys())
     if ENABLE not in pad.down:
@@ -214,10 +210,7 @@ class Gamepad:
 class DualSense:
     """Sony's DualSense, by USB or Bluetooth, on any system.
 
-    Args:
-        find: Opens the connected gamepads.
-        clock: Source of time, s.
-        drives: As of `Gamepad`.
+    `find` opens the connected ones; for other arguments see `Gamepad`.
     """
 
     help = Gamepad.help

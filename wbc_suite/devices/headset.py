@@ -6,7 +6,6 @@ import io
 import ssl
 from html import escape
 from http import HTTPStatus
-from importlib import resources
 from pathlib import Path
 from typing import Protocol
 
@@ -20,12 +19,12 @@ from wbc_suite.web.certificate import (
     installation_certificate,
     server_context,
 )
-from wbc_suite.web.server import is_loopback
+from wbc_suite.web.server import file_routes, is_loopback, send_file
 
 VIEW_PERIOD = 1.0 / 60.0  # s, of the poses that are sent to a page
-TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
+FOLDER = "devices/pages/headset"
 FILES = (
-    *("index.html", "page.css", "main.js", "session.js", "hands.js", "axes.js"),
+    *("page.css", "main.js", "session.js", "hands.js", "axes.js"),
     *("scene.js", "connection.js", "three.js"),
 )
 POLICY = (
@@ -141,7 +140,7 @@ class Headset(Stream):
     def _routes(self) -> list[web.RouteDef]:
         return [
             web.get("/", self._send_index),
-            *(web.get(f"/{name}", self._send_file) for name in FILES[1:]),
+            *file_routes(FOLDER, FILES, policy=POLICY),
             web.get("/scene", self._send_scene),
             web.get("/qr.svg", self._send_qr),
             web.get("/frames", self._receive),
@@ -156,12 +155,8 @@ class Headset(Stream):
         ways = "".join(
             f"<li><b>{title}</b> {_with_code(text)}</li>" for title, text in self.ways
         )
-        page = _read("index.html").replace("$ADDRESS", escape(self.url))
-        return _response(page.replace("$WAYS", ways), "index.html")
-
-    async def _send_file(self, request: web.Request) -> web.Response:
-        name = request.path[1:]
-        return _response(_read(name), name)
+        values = {"ADDRESS": escape(self.url), "WAYS": ways}
+        return send_file(FOLDER, "index.html", policy=POLICY, **values)
 
     async def _send_scene(self, _: web.Request) -> web.Response:
         if self._view is None:  # the robot is still being prepared
@@ -199,19 +194,6 @@ class Headset(Stream):
                     await viewer.send_str(status)
                     shown = status
                 await asyncio.sleep(VIEW_PERIOD)
-
-
-def _read(name: str) -> str:
-    page = resources.files("wbc_suite.devices") / "pages" / "headset" / name
-    return page.read_text("utf-8")
-
-
-def _response(text: str, name: str) -> web.Response:
-    return web.Response(
-        text=text,
-        content_type=TYPES[Path(name).suffix],
-        headers={"Content-Security-Policy": POLICY, "Cache-Control": "no-cache"},
-    )
 
 
 def _with_code(text: str) -> str:

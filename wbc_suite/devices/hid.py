@@ -1,11 +1,11 @@
 """USB and Bluetooth devices by their HID reports."""
 
 import contextlib
-import importlib
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 from wbc_suite.errors import DeviceError
+from wbc_suite.extras import import_extra
 
 UDEV_RULE = 'KERNEL=="hidraw*", ATTRS{idVendor}=="%04x", MODE="0660", TAG+="uaccess"'
 """udev rule with which users on Linux may open a vendor's devices."""
@@ -19,12 +19,9 @@ def open_hid(
     Raises:
         DeviceError: If hidapi or a device is missing, or may not be opened.
     """
-    try:
-        hid: Any = importlib.import_module("hid")
-    except ImportError as error:
-        raise DeviceError(
-            f"{kind} needs the package hidapi: pip install 'wbc-suite[devices]'."
-        ) from error
+    hid = import_extra(
+        "hid", "devices", error=DeviceError, note=f" {kind} needs hidapi."
+    )
     found: dict[Any, dict[str, Any]] = {}
     for info in hid.enumerate():
         if info["vendor_id"] in vendors and info["product_id"] in products:

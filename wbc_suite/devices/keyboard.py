@@ -20,7 +20,7 @@ TWIST = (0.25, 0.25, 0.25, 0.8, 0.8, 0.8)  # m/s and rad/s, of a held key
 BASE = (0.4, 0.4, 0.6)  # m/s and rad/s
 RISE = 0.1  # m/s, of the body
 FACTORS = {"+": 1.5, "=": 1.5, "-": 1.0 / 1.5}  # of the speeds, by key
-SLOWEST, FASTEST = 0.1, 4.0
+SLOWEST, FASTEST = 0.1, 4.0  # of the speeds above
 
 JOG: dict[str, tuple[int, float]] = {
     "w": (0, 1), "s": (0, -1), "a": (1, 1), "d": (1, -1), "r": (2, 1), "f": (2, -1),

@@ -12,7 +12,7 @@ from wbc_suite.tomlfile import FrozenModel
 
 MAX_BYTES = 32_768
 """Maximum size of a frame; two hands with all their joints take 4 kB."""
-MAX_BUTTONS = 32
+MAX_BUTTONS = 32  # of a frame; more than any controller has
 
 LARGEST_NUMBER = 1e6
 """Greatest absolute value of a number in a frame, in any unit."""
@@ -109,8 +109,3 @@ class PoseFrame(FrozenModel):
             buttons=frozenset(self.buttons),
             **self.model_dump(include={"time", "joints", "base", "height"}),
         )
-
-
-def frame_schema() -> dict[str, object]:
-    """Return the JSON Schema of a pose frame."""
-    return PoseFrame.model_json_schema()

@@ -9,7 +9,6 @@ import threading
 import time
 from dataclasses import replace
 from http import HTTPStatus
-from importlib import resources
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
@@ -17,7 +16,7 @@ from wbc_suite.devices.pose_frame import MAX_BUTTONS, MAX_BYTES, PoseFrame
 from wbc_suite.devices.state import DeviceState
 from wbc_suite.errors import DeviceError
 from wbc_suite.web.certificate import installation_certificate, server_context
-from wbc_suite.web.server import WebServer, page_url, token_for
+from wbc_suite.web.server import WebServer, page_url, send_file, token_for
 
 SOCKET = "/frames"
 SENDERS = 8  # connected at a time; only one of them moves the robot
@@ -101,13 +100,8 @@ class Stream:
         if self._server is not None:
             self._server.stop()
 
-    async def _send_page(self, request: web.Request) -> web.Response:
-        page = resources.files("wbc_suite.devices") / "pages" / "controls.html"
-        return web.Response(
-            text=page.read_text("utf-8"),
-            content_type="text/html",
-            headers={"Content-Security-Policy": POLICY, "Cache-Control": "no-store"},
-        )
+    async def _send_page(self, _: web.Request) -> web.Response:
+        return send_file("devices/pages", "controls.html", policy=POLICY)
 
     async def _receive(self, request: web.Request) -> web.StreamResponse:
         """Keep the newest frame of the sender that moves the robot."""

@@ -20,10 +20,11 @@ from wbc_suite.evaluation.rollouts import (
     Case,
     ErrorKind,
     PolicyError,
+    episode_seed,
+    episode_seeds,
     plan_rollouts,
     run_rollouts,
 )
-from wbc_suite.evaluation.seeds import episode_seed, episode_seeds
 from wbc_suite.evaluation.statistics import (
     Summary,
     interquartile_mean,

@@ -85,6 +85,7 @@ def compare(
     wins, losses, n = int(won.sum()), int(lost.sum()), len(pairs)
     uneven = wins + losses
     p_value = float(binomtest(wins, uneven).pvalue) if uneven else 1.0
+    verdict = "better" if wins > losses else "worse"
     return Comparison(
         pairs=n,
         only_first=losses,
@@ -93,7 +94,7 @@ def compare(
         interval=_difference_interval(wins, losses, n),
         p_value=p_value,
         false_alarms=false_alarms,
-        verdict=_verdict(wins, losses, alarm=p_value <= false_alarms),
+        verdict=verdict if p_value <= false_alarms else "undecided",
         improvement=_improvement(strata),
         improvement_interval=_improvement_interval(strata),
     )
@@ -108,12 +109,6 @@ def _paired(first: Episodes, second: Episodes) -> np.ndarray:
         for a, b in both.values()
     ]
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
-
-
-def _verdict(wins: int, losses: int, *, alarm: bool) -> Verdict:
-    if not alarm:
-        return "undecided"
-    return "better" if wins > losses else "worse"
 
 
 def _difference_interval(wins: int, losses: int, n: int) -> Interval:

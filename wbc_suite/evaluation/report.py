@@ -12,10 +12,11 @@ from typing import Any
 from wbc_suite.evaluation.results import Results
 from wbc_suite.evaluation.rollouts import Case
 from wbc_suite.evaluation.statistics import Interval, Summary
-from wbc_suite.evaluation.svg_plots import legend, rates_plot, steps_plot
 
 PACKAGES = ("wbc-suite", "mujoco", "numpy", "scipy")
-CASES = ("case", "episodes", "success", "Wilson 95 %", "exact 95 %")
+COLOURS = ("#2f6fab", "#c8553d", "#3f8f5b", "#8a5fa8", "#b08a1e", "#3a9aa3")
+"""Of the cases, in turn, in all plots."""
+CASES = ("case", "0 to 100 %", "success", "Wilson 95 %", "exact 95 %", "episodes")
 CASES += ("return, IQM", "its 95 %", "steps", "physics errors")
 PAIRS = ("policy", "beside", "verdict", "difference", "95 %", "only this", "only that")
 PAIRS += ("p", "P(return larger)", "95 %")
@@ -26,19 +27,14 @@ def report_page(results: Results, command: str) -> str:
     template = Template(
         resources.files("wbc_suite.evaluation").joinpath("report.html").read_text()
     )
-    titles = [case.title for case in results.summaries]
-    rows = [(c.title, s.success_rate, s.wilson) for c, s in results.summaries.items()]
-    curves = {
-        case.title: ([int(e["steps"]) for e in es if e["succeeded"]], len(es))
-        for case, es in results.episodes.items()
-    }
     return template.substitute(
         summary=_overall(results),
         command=html.escape(command),
         about=html.escape(_about(results)),
-        rates=rates_plot(rows),
-        steps=legend(titles) + steps_plot(curves),
-        cases=_table(CASES, (_case(c, s) for c, s in results.summaries.items())),
+        cases=_table(
+            CASES, (_case(k, *each) for k, each in enumerate(results.summaries.items()))
+        ),
+        steps=_steps_plot(results.episodes),
         comparisons=_comparisons(results),
         failures=_failures(results),
     )
@@ -67,14 +63,18 @@ def _about(results: Results) -> str:
     )
 
 
-def _case(case: Case, s: Summary) -> list[str]:
+def _case(number: int, case: Case, s: Summary) -> list[str]:
+    """Return the row of a case; a bar shows its rate in the interval of Wilson."""
+    (low, high), colour = s.wilson, _colour(number)
     iqm, interval = f"{s.iqm_return:.3g}", s.iqm_return_interval
     return [
-        case.title,
-        str(s.episodes),
+        f'<i class="key" style="background:{colour}"></i>{html.escape(case.title)}',
+        f'<div class="rate"><i style="left:{low:.2%};width:{high - low:.2%};'
+        f'background:{colour}"></i><b style="left:{s.success_rate:.2%}"></b></div>',
         f"{s.success_rate:.1%}",
         _percent(s.wilson),
         _percent(s.exact),
+        str(s.episodes),
         iqm,
         f"{interval[0]:.3g} to {interval[1]:.3g}",
         f"{s.mean_steps:.0f}",
@@ -82,13 +82,44 @@ def _case(case: Case, s: Summary) -> list[str]:
     ]
 
 
+def _steps_plot(episodes: Mapping[Case, Sequence[Mapping[str, Any]]]) -> str:
+    """Return the share of each case's episodes that succeeded by a number of steps.
+
+    In SVG, of width and height 100.
+    """
+    solved = [
+        sorted(int(e["steps"]) for e in each if e["succeeded"])
+        for each in episodes.values()
+    ]
+    last = max((steps[-1] for steps in solved if steps), default=1)
+    curves = ""
+    for k, (case, steps) in enumerate(zip(episodes, solved, strict=True)):
+        stairs = "".join(
+            f"H{100 * step / last:.2f}V{100 - 100 * rank / len(episodes[case]):.2f}"
+            for rank, step in enumerate(steps, 1)
+        )
+        curves += f'<path stroke="{_colour(k)}" d="M0 100{stairs}H100">'
+        curves += f"<title>{html.escape(case.title)}</title></path>"
+    return (
+        '<div class="steps"><p><span>100 %</span><span>50 %</span><span>0 %</span></p>'
+        '<svg viewBox="0 0 100 100" preserveAspectRatio="none" role="img" '
+        'aria-label="Share of episodes that succeeded by a step">'
+        f'<path class="grid" d="M0 0H100M0 50H100M0 100H100"></path>{curves}</svg>'
+        f"<p></p><p><span>0</span><span>{last} steps</span></p></div>"
+    )
+
+
+def _colour(case: int) -> str:
+    return COLOURS[case % len(COLOURS)]
+
+
 def _comparisons(results: Results) -> str:
     if not results.comparisons:
         return ""
     rows = [
         [
-            second,
-            first,
+            html.escape(second),
+            html.escape(first),
             found.verdict,
             f"{found.difference:+.1%}",
             _percent(found.interval, sign=True),
@@ -117,7 +148,7 @@ def _failures(results: Results) -> str:
         for case, episodes in results.episodes.items()
     }
     rows = [
-        [title, reason, str(found.count(reason))]
+        [html.escape(title), html.escape(reason), str(found.count(reason))]
         for title, found in reasons.items()
         for reason in dict.fromkeys(found)
     ]
@@ -148,9 +179,9 @@ def _percent(interval: Interval, *, sign: bool = False) -> str:
 
 
 def _table(head: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
-    cells = "".join(f"<th>{html.escape(name)}</th>" for name in head)
+    """Return a table of cells in HTML."""
+    cells = "".join(f"<th>{name}</th>" for name in head)
     lines = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in row) + "</tr>"
-        for row in rows
+        "<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows
     )
     return f'<div class="wide"><table><tr>{cells}</tr>{lines}</table></div>'

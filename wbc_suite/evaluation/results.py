@@ -1,4 +1,4 @@
-"""Results of an evaluation: its cases, their episodes, summaries and comparisons."""
+"""Results of an evaluation: cases, episodes, summaries, comparisons, films."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.evaluation.comparison import Comparison, compare
-from wbc_suite.evaluation.rollouts import Case, ErrorKind, failed_episode
+from wbc_suite.evaluation.rollouts import (
+    Case,
+    ErrorKind,
+    failed_episode,
+    make_case,
+    payload_of,
+    run_episode,
+)
 from wbc_suite.evaluation.statistics import (
     Summary,
     interquartile_mean,
@@ -17,7 +24,12 @@ from wbc_suite.evaluation.statistics import (
     success_interval,
     summarise,
 )
-from wbc_suite.executors import Outcome, WorkItem
+from wbc_suite.executors import Executor, Outcome, WorkItem, run_items
+from wbc_suite.recording.video import write_video
+
+FILM_SIZE = 224  # pixels
+MOST_PICTURES = 80  # of a film
+FILM_RATE = 10.0  # pictures per second
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -76,7 +88,9 @@ class Results:
                     "confidence": 0.95,
                     "wilson": success_interval(successes, total, "wilson"),
                     "exact": success_interval(successes, total, "exact"),
-                    "stratified": stratified_bootstrap(strata, _mean),
+                    "stratified": stratified_bootstrap(
+                        strata, lambda values: float(values.mean())
+                    ),
                 },
                 "iqm_return": interquartile_mean(np.concatenate(returns)),
                 "iqm_return_interval": stratified_bootstrap(
@@ -168,6 +182,53 @@ def episodes_of(item: WorkItem, outcome: Outcome) -> list[dict[str, Any]]:
     ]
 
 
+def film_failures(
+    results: Results, *, most: int, folder: Path, executor: Executor
+) -> None:
+    """Film the first failures of each case, at most so many; add them to the results.
+
+    An episode that cannot be drawn is left out.
+    """
+    items: dict[str, Case] = {}
+    wanted: list[WorkItem] = []
+    for case, episodes in results.episodes.items():
+        failed = [e for e in episodes if not e["succeeded"]][:most]
+        for episode in failed:
+            payload = payload_of(case) | {"film": episode["seed"]}
+            payload |= {"every": max(1, -(-int(episode["steps"]) // MOST_PICTURES))}
+            wanted.append(WorkItem.with_digest("film", payload))
+            items[wanted[-1].name] = case
+    for outcome in run_items(film, wanted, folder=folder, executor=executor):
+        if outcome.error is None:
+            made: dict[str, Any] = {**outcome.result}
+            shown = Film(**made | {"path": folder / made["path"]})
+            results.films.setdefault(items[outcome.name], []).append(shown)
+
+
+def film(item: WorkItem, folder: Path) -> dict[str, Any]:
+    """Film one episode; return its seed, steps, and the file in the folder."""
+    payload, pictures = item.payload, []
+    env = make_case(
+        payload, render_mode="rgb_array", render_size=(FILM_SIZE, FILM_SIZE)
+    )
+    count = 0
+
+    def draw() -> None:
+        nonlocal count
+        if count % payload["every"] == 0:
+            pictures.append(np.asarray(env.render()))
+        count += 1
+
+    try:
+        seed = payload["film"]
+        episode = run_episode(env, env, seed, payload["policy"], after_step=draw)
+    finally:
+        env.close()
+    path = Path("films") / f"{item.name}.webp"
+    write_video(pictures, folder / path, rate=FILM_RATE)
+    return {"seed": seed, "steps": episode["steps"], "path": str(path)}
+
+
 def _comparisons(
     played: Mapping[Case, Sequence[dict[str, Any]]],
 ) -> dict[tuple[str, str], Comparison]:
@@ -185,14 +246,9 @@ def _comparisons(
 
 
 def _case(case: Case) -> dict[str, Any]:
-    return {
-        "case": case.title,
-        "benchmark": case.benchmark,
-        "robots": list(case.robots),
-        "controller": case.controller,
-        "policy": case.policy,
-        "perturb": case.perturb,
-    }
+    names = ("benchmark", "controller", "policy", "perturb")
+    given = {name: getattr(case, name) for name in names}
+    return {"case": case.title, "robots": list(case.robots)} | given
 
 
 def _lerobot_group(
@@ -209,7 +265,3 @@ def _lerobot_group(
         "video_paths": films,
         "predicted_video_paths": [],
     }
-
-
-def _mean(values: np.ndarray) -> float:
-    return float(values.mean())

@@ -1,16 +1,20 @@
 """Episodes of policies in environments, as work items of an executor."""
 
+import hashlib
 import json
 import multiprocessing
 import re
 import shutil
+import signal
+import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from functools import lru_cache
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import gymnasium
@@ -20,11 +24,12 @@ from wbc_suite.envs import RobotEnv, make
 from wbc_suite.errors import ConfigError, WbcError, shortened
 from wbc_suite.evaluation.perturbations import PERTURBATIONS, Perturbation
 from wbc_suite.evaluation.policies import Policy, make_policy
-from wbc_suite.evaluation.time_limit import TimeLimitExceeded, time_limit
 from wbc_suite.executors import WorkItem
 from wbc_suite.recording.dataset import parts_folder
 from wbc_suite.typing import Vector
 from wbc_suite.wrappers import DataCollection
+
+SEED_BITS = 53  # so that every reader of JSON keeps a seed
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -53,6 +58,22 @@ class Case:
         parts = (self.benchmark, "+".join(self.robots), self.controller, self.policy)
         perturbed = f"with another {self.perturb}" if self.perturb else ""
         return " ".join(p for p in (*parts, perturbed) if p)
+
+
+def episode_seed(base: int, benchmark: str, episode: int) -> int:
+    """Return the seed of an episode; it depends on nothing else.
+
+    So another benchmark, or more episodes, change no scene. `benchmark` is a name or a
+    file, of which the stem counts; case is ignored.
+    """
+    name = Path(benchmark).stem.casefold()
+    digest = hashlib.sha256(f"{base}/{name}/{episode}".encode()).digest()
+    return int.from_bytes(digest[:8], "big") >> (64 - SEED_BITS)
+
+
+def episode_seeds(benchmark: str, count: int, *, base: int = 0) -> list[int]:
+    """Return the seeds of the first episodes of a benchmark."""
+    return [episode_seed(base, benchmark, k) for k in range(count)]
 
 
 def plan_rollouts(
@@ -269,3 +290,31 @@ def _action(
 
 def _text_of(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"
+
+
+class TimeLimitExceeded(Exception):
+    """A call took longer than its limit."""
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise TimeLimitExceeded in a block that takes longer, s; 0 for no limit.
+
+    The timer is a signal, which Python handles between two of its own instructions: a
+    call into a library is interrupted when it returns. Other threads than the main one
+    have no limit.
+    """
+    if seconds <= 0.0 or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise TimeLimitExceeded
+
+    previous = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, previous)

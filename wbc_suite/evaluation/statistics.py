@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Vector
 
-CONFIDENCE = 0.95
-RESAMPLES = 2000
+CONFIDENCE = 0.95  # of all intervals
+RESAMPLES = 2000  # of a bootstrap
 
 Interval: TypeAlias = tuple[float, float]
 """Lower and upper bound."""

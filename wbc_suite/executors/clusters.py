@@ -1,15 +1,15 @@
 """Executors of clusters: Ray, whose machines may come and go, and Slurm by submitit."""
 
-import importlib
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from wbc_suite.errors import ConfigError
 from wbc_suite.executors.executor import Outcome, Work, WorkItem, run_item
+from wbc_suite.extras import import_extra
 
-POLL_SECONDS = 0.5
+NOTE = " The 'process' executor needs no package."
+POLL_SECONDS = 0.5  # between two looks at the jobs
 
 
 class RayCluster:
@@ -26,7 +26,7 @@ class RayCluster:
     """
 
     def __init__(self, *, workers: int | None = None, attempts: int = 3) -> None:
-        self._ray = ray = _import("ray", extra="ray")
+        self._ray = ray = import_extra("ray", "ray", error=ConfigError, note=NOTE)
         self._attempts = attempts
         if not ray.is_initialized():
             ray.init(log_to_driver=False, include_dashboard=False)  # it has no password
@@ -80,7 +80,7 @@ class Slurm:
         attempts: int = 3,
         parameters: dict[str, object] | None = None,
     ) -> None:
-        self._submitit = _import("submitit", extra="slurm")
+        self._submitit = import_extra("submitit", "slurm", error=ConfigError, note=NOTE)
         self._cluster, self._attempts = cluster, attempts
         self._parameters = {"timeout_min": 240, **(parameters or {})}
 
@@ -107,13 +107,3 @@ class Slurm:
                     yield Outcome(name=item.name, error=f"Its job failed: {reason}")
             if jobs and not finished:
                 time.sleep(POLL_SECONDS)
-
-
-def _import(package: str, *, extra: str) -> Any:
-    try:
-        return importlib.import_module(package)
-    except ImportError as error:
-        raise ConfigError(
-            f"{package} is not installed: pip install 'wbc-suite[{extra}]'. The "
-            "'process' executor needs no package."
-        ) from error

@@ -1,12 +1,12 @@
 """Results of work items in a folder, so that stopped work continues later."""
 
 import json
-import os
 from collections.abc import Callable, Sequence
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from wbc_suite.atomic_files import check_folder, write_bytes
 from wbc_suite.errors import ConfigError, DatasetError
 from wbc_suite.executors.executor import Executor, Outcome, Work, WorkItem
 from wbc_suite.files import read_text
@@ -18,31 +18,21 @@ MAX_BYTES = 64 << 20  # larger result files are not read
 class ResultFolder:
     """One JSON file per finished item, in the subfolder `results` of a folder.
 
-    A file is complete or absent: it is written under another name and renamed. One with
-    a wrong checksum counts as absent. The folder is made if missing; DatasetError is
-    raised if it cannot be written to.
+    A file is complete or absent; one with a wrong checksum counts as absent. The folder
+    is made if missing; DatasetError is raised if it cannot be written to.
     """
 
     def __init__(self, folder: Path) -> None:
         self._results = folder / "results"
-        try:
-            self._results.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise DatasetError(f"'{folder}' cannot be written to: {error}.") from error
+        check_folder(self._results)
 
     def write(self, item: WorkItem, outcome: Outcome) -> None:
         """Write an item's outcome, in place of an earlier one."""
         record = {"item": item.name, "payload": item.payload}
         record |= {"error": outcome.error, "result": outcome.result}
         record["sha256"] = _checksum(outcome.result)
-        path = self._path(item)
-        temporary = path.with_suffix(f".{os.getpid()}.tmp")
         text = json.dumps(record, indent=1, sort_keys=True)
-        try:
-            temporary.write_text(text + "\n", encoding="utf-8")
-            temporary.replace(path)
-        except OSError as error:
-            raise DatasetError(f"'{path}' cannot be written: {error}.") from error
+        write_bytes(self._path(item), f"{text}\n".encode())
 
     def read(self, item: WorkItem) -> dict[str, Any] | None:
         """Return an item's result; None if it has none, or had another payload."""

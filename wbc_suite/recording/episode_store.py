@@ -13,8 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, Self
 
+from wbc_suite.atomic_files import check_folder, delete_temporaries
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.atomic_files import check_folder, delete_temporaries
 from wbc_suite.recording.dataset import Dataset, part_files, parts_folder
 from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.hdf5_writer import uncompressed_bytes, write_dataset

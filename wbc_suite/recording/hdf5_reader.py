@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from wbc_suite.errors import DatasetError, UnknownNameError
 
-MAX_CHILDREN = 200_000
+MAX_CHILDREN = 200_000  # of a group, or names of a mask
 MAX_ATTRIBUTES = 1000  # of a group or dataset
 MAX_NAME = 200  # characters
 MAX_BYTES = 1 << 32  # of one column

@@ -13,14 +13,14 @@ from typing import Any
 import h5py
 import numpy as np
 
+from wbc_suite.atomic_files import check_folder, replace_file
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.atomic_files import check_folder, replace_file
 from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint, pieces
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 1  # of the attributes and columns that are added
 PICTURE_BYTES = 10_000  # rows of at least so many are pictures, and are compressed
 STATES = "states"  # are compressed too: most of their numbers seldom change
-CHUNK_BYTES = 1 << 16
+CHUNK_BYTES = 1 << 16  # of `states`, which is compressed chunk by chunk
 
 
 def uncompressed_bytes(episode: Episode) -> int:

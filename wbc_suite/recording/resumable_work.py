@@ -5,10 +5,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from wbc_suite.atomic_files import check_folder
 from wbc_suite.errors import DatasetError
 from wbc_suite.executors import Executor, Outcome, Serial, WorkItem, run_items
 from wbc_suite.executors.executor import Work
-from wbc_suite.recording.atomic_files import check_folder
 
 
 def work_folder(out: Path) -> Path:

@@ -1,32 +1,27 @@
-"""Episodes as videos (.mp4, .webp, .gif) and as contact sheets."""
+"""Videos of episodes: .mp4, .webp and .gif."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image
 
+from wbc_suite.atomic_files import check_folder, replace_file
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.atomic_files import check_folder, replace_file
-from wbc_suite.recording.dataset import Dataset
-from wbc_suite.recording.env_source import rebuild
+from wbc_suite.extras import import_extra
 from wbc_suite.recording.episode import Episode
-from wbc_suite.recording.extras import import_extra
-from wbc_suite.recording.mp4_writer import Mp4Writer
-from wbc_suite.recording.plots import save_picture
 from wbc_suite.recording.replaying import play_actions, play_states
 
 Picture = NDArray[np.uint8]
 
 RATE = 20.0  # pictures per second, at most
 PILLOW = {".gif": "GIF", ".webp": "WEBP"}
-SHEET_ROWS, SHEET_COLUMNS, SHEET_SIZE = 12, 6, 128  # episodes, pictures, pixels
-LABEL = 14  # pixels
 
 
 def check_video(path: Path) -> None:
@@ -64,40 +59,6 @@ def write_video(pictures: Iterable[Picture], path: Path, *, rate: float) -> None
     replace_file(path, write)
 
 
-def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> None:
-    """Draw episodes, one per row, by their pictures of the camera or their states."""
-    names = dataset.names[:SHEET_ROWS]
-    if not names:
-        raise DatasetError(f"'{dataset.path}' has no episodes to draw.")
-    env: RobotEnv | None = None
-    height = SHEET_SIZE + LABEL
-    size = SHEET_COLUMNS * SHEET_SIZE, len(names) * height
-    sheet = Image.new("RGB", size, "white")
-    pen = ImageDraw.Draw(sheet)
-    for row, episode in enumerate(map(dataset.episode, names)):
-        word = {None: "", True: ", success", False: ", no success"}[episode.success]
-        caption = f"{episode.name}: {episode.length} actions{word}"
-        pen.text((4, row * height + 1), caption, fill="black")
-        at = np.linspace(0, episode.length - 1, SHEET_COLUMNS).round().astype(int)
-        pictures: Any = episode.columns.get(f"obs/{camera}_image")
-        if pictures is None:
-            env = env or rebuild(
-                dataset,
-                render_mode="rgb_array",
-                render_camera=camera,
-                render_size=(SHEET_SIZE, SHEET_SIZE),
-                use_camera_obs=False,
-            )
-            states = play_states(env, episode)
-            pictures = {k: np.asarray(env.render()) for k in states if k in at}
-        for column, k in enumerate(at.tolist()):
-            image = Image.fromarray(pictures[k]).resize((SHEET_SIZE, SHEET_SIZE))
-            sheet.paste(image, (column * SHEET_SIZE, row * height + LABEL))
-    if env is not None:
-        env.close()
-    save_picture(sheet, path)
-
-
 def _write_animation(pictures: Iterable[Picture], path: Path, rate: float) -> None:
     images = [Image.fromarray(picture) for picture in pictures]
     if not images:
@@ -113,3 +74,44 @@ def _write_animation(pictures: Iterable[Picture], path: Path, rate: float) -> No
         duration=[b - a for a, b in pairwise(ends)],
         loop=0,
     )
+
+
+class Mp4Writer:
+    """Writes an H.264 video picture by picture at a rate, Hz; needs the package `av`.
+
+    An error names the `extra` that installs it; `options` are those of libx264.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        rate: float,
+        extra: str,
+        options: dict[str, str] | None = None,
+    ) -> None:
+        self._av = import_extra("av", extra)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = self._av.open(str(path), "w")
+        self._rate = Fraction(rate).limit_denominator(1001)  # as of 30000/1001 Hz
+        self._options = options or {}
+        self._stream, self._count = None, 0
+
+    def add(self, picture: Picture) -> None:
+        """Add a picture, shape (height, width, 3)."""
+        if self._stream is None:
+            self._stream = self._file.add_stream(
+                "libx264", rate=self._rate, options=self._options
+            )
+            self._stream.height, self._stream.width = picture.shape[:2]
+            self._stream.pix_fmt = "yuv420p"
+        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture))
+        frame.pts, frame.time_base = self._count, 1 / self._rate
+        self._file.mux(self._stream.encode(frame))
+        self._count += 1
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._stream is not None:
+            self._file.mux(self._stream.encode())
+        self._file.close()

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 
+from wbc_suite.atomic_files import check_folder, write_bytes
 from wbc_suite.control.composite.whole_body_config import default_whole_body_config
 from wbc_suite.control.composite.whole_body_dynamics_config import (
     default_dynamics_config,
@@ -84,10 +85,6 @@ class AdoptPage:
             for name in feet:
                 self._add_sole(name)
         self._add_writing()
-
-    def stop(self) -> None:
-        """Close the page."""
-        self.page.stop()
 
     def _add_frame(self, name: str) -> None:
         frame = self.frames[name]
@@ -175,7 +172,7 @@ class AdoptPage:
             self._answer.content = "Writing and checking ..."
             try:
                 text = self.write()
-            except (WbcError, OSError) as error:
+            except WbcError as error:
                 text = f"Not written: {error}"
             self._answer.content = text.replace("\n", "  \n")
             self._say(text)
@@ -213,8 +210,7 @@ class AdoptPage:
         """Write the description and the controllers; return what to do next.
 
         Raises:
-            WbcError: If the robot is not consistent.
-            OSError: If a file cannot be written.
+            WbcError: If the robot is not consistent, or a file cannot be written.
         """
         robot = self.adopted()
         stem = robot.name.lower()
@@ -225,9 +221,8 @@ class AdoptPage:
         if gait := self._gait(robot):
             files[f"controllers/{stem}_whole_body_id.toml"] = toml_text(gait)
         for name, text in files.items():
-            path = self._folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
+            check_folder((self._folder / name).parent)
+            write_bytes(self._folder / name, text.encode())
         faults = hold_faults(robot, controller=str(self._folder / [*files][1]))
         return "\n".join(
             [

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from wbc_suite.viewers.page_process import Session
 
+# Colours: red, green and blue, 0 to 255.
 STANDING, LIFTED, FOOTSTEP = (48, 150, 84), (120, 130, 145), (232, 140, 30)
 CAPTURE_POINT, FORCE = (190, 50, 150), (190, 25, 20)
 ABOVE = 0.006  # m, of what is drawn on the ground
@@ -26,11 +27,7 @@ VISIBLE = 0.01  # m; an arrow that changes by less keeps its geometry
 
 
 class BalanceOverlays:
-    """Draw the balance of the robot for those clients that ask for it.
-
-    Args:
-        session: Session that reports it.
-    """
+    """Draw the balance of the robot for those clients that ask for it."""
 
     def __init__(self, session: "Session") -> None:
         self._session = session
@@ -59,9 +56,6 @@ class _Overlay:
     """Draw the balance of a robot for one client.
 
     Nodes are moved where possible: new geometry takes a browser longer than a new pose.
-
-    Args:
-        client: The client.
     """
 
     def __init__(self, client: "viser.ClientHandle") -> None:
@@ -73,8 +67,14 @@ class _Overlay:
         """Draw a state; nothing for None."""
         marks = {} if balance is None else marks_of(balance)
         for name, mark in marks.items():
-            node = self._lines.get(name) or self._add_lines(name, mark)
-            place(node, mark.pose)
+            if name not in self._lines:
+                self._lines[name] = self._scene.add_line_segments(
+                    f"/balance/{name}",
+                    mark.segments,
+                    colors=mark.colour,
+                    thickness=LINE,
+                )
+            place(self._lines[name], mark.pose)
         for name, node in self._lines.items():
             node.visible = name in marks
         points, vectors = force_arrows(balance)
@@ -84,13 +84,9 @@ class _Overlay:
             arrow.visible = k < len(points)
             if arrow.visible:
                 arrow.position = tuple(points[k])
-                self._stretch(arrow, vectors[k])
-
-    def _add_lines(self, name: str, mark: "Mark") -> "viser.LineSegmentsHandle":
-        self._lines[name] = self._scene.add_line_segments(
-            f"/balance/{name}", mark.segments, colors=mark.colour, thickness=LINE
-        )
-        return self._lines[name]
+                if np.linalg.norm(arrow.points[0, 1] - vectors[k]) > VISIBLE:
+                    ends = np.stack([np.zeros(3), vectors[k]])
+                    arrow.points = ends[None].astype(np.float32)
 
     def _add_arrow(self, number: int) -> "viser.ArrowsHandle":
         return self._scene.add_arrows(
@@ -101,11 +97,6 @@ class _Overlay:
             head_radius=0.02,
             head_length=0.05,
         )
-
-    def _stretch(self, arrow: "viser.ArrowsHandle", vector: Vector) -> None:
-        if np.linalg.norm(arrow.points[0, 1] - vector) > VISIBLE:
-            points = np.stack([np.zeros(3), vector])
-            arrow.points = points[None].astype(np.float32)
 
 
 class Mark(NamedTuple):

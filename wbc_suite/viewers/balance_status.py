@@ -60,11 +60,6 @@ class BalanceStatus:
 class BalanceReader:
     """Reads the balance of a robot that walks, while a client displays it.
 
-    Args:
-        model: The simulated model.
-        data: Its state.
-        controller: The robot's controller.
-
     Attributes:
         walks: Whether the controller reports balance, as WHOLE_BODY_ID does.
         report: What it reported last, `info["balance"]`; empty before.
@@ -115,16 +110,13 @@ class BalanceReader:
         )
 
     def _feet(self) -> tuple[FootStatus, ...]:
-        measured, gait = (
-            self._controller.dynamics.measured,
-            self._controller.dynamics.gait,
-        )
+        measured = self._controller.dynamics.measured
         return tuple(
             FootStatus(
                 name=foot.frame,
                 position=measured.foot[k].copy(),
                 yaw=float(measured.foot_yaw[k]),
-                sole=gait.sole[k].copy(),
+                sole=self._controller.dynamics.gait.sole[k].copy(),
                 stands=foot.frame in self.report["stance"],
             )
             for k, foot in enumerate(self._controller.config.feet)

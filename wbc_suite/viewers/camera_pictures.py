@@ -82,8 +82,10 @@ class CameraPictures:
                 continue
             try:
                 self._draw()
-            except DeviceError as error:
-                self._refuse(str(error))
+            except DeviceError as error:  # it is said beside the pictures
+                for _, image in self._chosen.values():
+                    image.label, image.visible = str(error), True
+                self._chosen.clear()
 
     def _draw(self) -> None:
         """Send each chosen picture of the newest state."""
@@ -95,9 +97,3 @@ class CameraPictures:
             if name not in pictures:
                 pictures[name] = self._cameras.image(name, width=WIDTH, height=HEIGHT)
             image.image = pictures[name]
-
-    def _refuse(self, reason: str) -> None:
-        """Say beside the pictures why there are none."""
-        for _, image in self._chosen.values():
-            image.label, image.visible = reason, True
-        self._chosen.clear()

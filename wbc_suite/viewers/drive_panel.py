@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc_suite.typing import Vector
+from wbc_suite.viewers.scene_setup import marked, unmarked
 from wbc_suite.viewers.session_state import Snapshot
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ PAD = (
     ("KeyF", "down", "down", 3),
 )
 """Key, sign, meaning and axis of each button, in rows of four as on a keyboard."""
-IN_BODY, IN_WORLD = "Body", "World"
+IN_BODY, IN_WORLD = HOLDS = "Body", "World"
 HOLD_HINT = (
     "Body: targets of hands move with the robot. World: they stay where they are."
 )
@@ -37,19 +38,15 @@ class DrivePanel:
     """Buttons that are held, speed, and what targets of hands are fixed to.
 
     Keys and buttons are received by `HeldKeys`.
-
-    Args:
-        server: Server of the page.
-        session: Session that is driven.
     """
 
-    def __init__(self, server: "viser.ViserServer", session: "Session") -> None:
+    def __init__(self, gui: "viser.GuiApi", session: "Session") -> None:
         self._session, self._info = session, session.info
         title = "Walk" if self._info.walks else "Drive"
-        with server.gui.add_folder(title):
-            server.gui.add_html(pad_html(self._info.drive))
-            self._readout = server.gui.add_html("")
-            self._speed = server.gui.add_slider(
+        with gui.add_folder(title):
+            gui.add_html(pad_html(self._info.drive))
+            self._readout = gui.add_html("")
+            self._speed = gui.add_slider(
                 "Speed [%]",
                 min=10,
                 max=100,
@@ -58,15 +55,15 @@ class DrivePanel:
                 hint=SPEED_HINT,
             )
             self._hold = (
-                server.gui.add_button_group(
-                    "Hands stay in", _marked(True), hint=HOLD_HINT
+                gui.add_button_group(
+                    "Hands stay in", marked(HOLDS, IN_BODY), hint=HOLD_HINT
                 )
                 if self._info.rides
                 else None
             )
         if self._hold is not None:
             hold = self._hold
-            hold.on_click(lambda _: session.ride(hold.value.strip("• ") == IN_BODY))
+            hold.on_click(lambda _: session.ride(unmarked(hold.value) == IN_BODY))
 
     def receive(self, client: int, axes: Vector | None) -> None:
         """Drive by axes forward, left, turn, up, -1 .. 1, shape (4,); None: it left."""
@@ -80,7 +77,8 @@ class DrivePanel:
         """Display the commanded velocity."""
         self._readout.content = velocity_html(snapshot.velocity, snapshot.drive_waits)
         if self._hold is not None:
-            self._hold.options = _marked(snapshot.rides)
+            chosen = IN_BODY if snapshot.rides else IN_WORLD
+            self._hold.options = marked(HOLDS, chosen)
 
 
 def pad_html(limits: Vector) -> str:
@@ -115,10 +113,3 @@ def velocity_html(velocity: Vector, waits: bool = False) -> str:
     idle = RELEASE_FIRST if waits else "Hold a key or a button"
     text = ", ".join(parts) or idle
     return f"<div style='padding:0 .9em;font-size:.82em;opacity:.7'>{text}</div>"
-
-
-def _marked(in_body: bool) -> tuple[str, str]:
-    """Return the labels of what hands are fixed to, with the chosen one marked."""
-    chosen = IN_BODY if in_body else IN_WORLD
-    first, second = (f"• {x} •" if x == chosen else x for x in (IN_BODY, IN_WORLD))
-    return first, second

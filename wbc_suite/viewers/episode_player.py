@@ -1,20 +1,26 @@
-"""Playback of recorded episodes: play, pause, seek, speed, next and previous."""
+"""Playback of recorded episodes: play, pause, seek, speed, next and previous.
+
+`ReplayPage` shows it in a page, `show_in_window` in MuJoCo's own window.
+"""
 
 import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from wbc_suite.devices.mjgui import open_window
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import Dataset, Episode
 from wbc_suite.recording.replaying import play_actions, start_as
 from wbc_suite.typing import Matrix, Vector
 
-SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0)
+SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0)  # recorded time per wall time
 PAUSE = 1.0  # s, between the end of an episode and the next one
+FRAME_PERIOD = 1.0 / 60.0  # s, of MuJoCo's window
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -209,3 +215,43 @@ def _fitted(values: Vector, count: int) -> Vector:
     """Return one value for each state: cut, or padded with the last one."""
     padded = np.concatenate([values, np.repeat(values[-1:], max(count, 1))])
     return np.asarray(padded[:count], dtype=np.float64)
+
+
+WINDOW_KEYS: dict[int, Callable[[EpisodePlayer], None]] = {
+    32: EpisodePlayer.toggle,  # space
+    262: lambda player: player.step_frames(1),  # right
+    263: lambda player: player.step_frames(-1),  # left
+    264: lambda player: player.skip(1),  # down
+    265: lambda player: player.skip(-1),  # up
+}
+"""Commands by GLFW key code."""
+
+
+def show_in_window(
+    player: EpisodePlayer, env: RobotEnv, launch: Callable[..., Any] | None = None
+) -> None:
+    """Play episodes until the window is closed.
+
+    Space pauses and resumes; left and right step by a state, up and down by an episode.
+    `launch` opens a window, MuJoCo's passive viewer by default.
+
+    Raises:
+        DeviceError: If there is no display.
+    """
+    model, data = env.simulation.model, env.simulation.data
+
+    def press(key: int) -> None:
+        if key in WINDOW_KEYS:
+            WINDOW_KEYS[key](player)
+
+    player.advance()
+    hidden = {"show_left_ui": False, "show_right_ui": False}
+    with (launch or open_window)(model, data, key_callback=press, **hidden) as window:
+        while window.is_running():
+            due = time.monotonic() + FRAME_PERIOD
+            with window.lock():
+                status = player.advance()
+                if status.clip is not None:
+                    env.show_state(status.clip.states[status.frame])
+            window.sync()
+            time.sleep(max(0.0, due - time.monotonic()))

@@ -16,23 +16,21 @@ if TYPE_CHECKING:
     Slider = viser.GuiSliderHandle[float]
     Event = viser.GuiEvent[Slider]
 
-STEP = 0.02
+STEP = 0.02  # of the closing, -1 .. 1
 USER_TIME = 1.0  # s; after the user moved a slider, it is not updated for so long
 
 
 class GripperSliders:
     """A slider for the whole gripper and, below it, one per synergy."""
 
-    def __init__(
-        self, server: "viser.ViserServer", session: "Session", name: str
-    ) -> None:
-        self._server, self._session, self._name = server, session, name
+    def __init__(self, gui: "viser.GuiApi", session: "Session", name: str) -> None:
+        self._gui, self._session, self._name = gui, session, name
         self._touched = -np.inf  # time
         labels, goal = session.info.grippers[name], session.snapshot.grippers[name]
         self._whole = self._add(plain(name).capitalize(), float(np.mean(goal)))
         self._fingers: list[Slider] = []
         if len(labels) > 1:
-            with server.gui.add_folder("Fingers", expand_by_default=False):
+            with gui.add_folder("Fingers", expand_by_default=False):
                 self._fingers = [
                     self._add(plain(label), float(value))
                     for label, value in zip(labels, goal, strict=True)
@@ -69,7 +67,7 @@ class GripperSliders:
         self._session.set_gripper(self._name, index, self._fingers[index].value)
 
     def _add(self, label: str, value: float) -> "Slider":
-        return self._server.gui.add_slider(
+        return self._gui.add_slider(
             label,
             min=-1.0,
             max=1.0,

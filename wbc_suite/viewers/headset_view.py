@@ -6,7 +6,6 @@ import struct
 import mujoco
 import numpy as np
 
-from wbc_suite.control.reasons import Reason
 from wbc_suite.devices.action_ports import LimbKind, side_of
 from wbc_suite.robot.triangle_meshes import TriangleMesh, merge
 from wbc_suite.typing import Vector
@@ -69,7 +68,8 @@ class SessionView:
         for name in self._hands:
             limb = snapshot.limbs[name]
             if _state(snapshot, limb) == "unreachable":
-                return f"{self._titles[name]} cannot follow{_because(limb)}", RED
+                why = f": {limb.reasons[0]}" if limb.reasons else ""
+                return f"{self._titles[name]} cannot follow{why}", RED
         for name in self._hands:
             if _state(snapshot, snapshot.limbs[name]) == "limited":
                 return f"{self._titles[name]}: {snapshot.limbs[name].acting[0]}", AMBER
@@ -84,11 +84,6 @@ def _state(snapshot: Snapshot, limb: LimbStatus) -> str:
     if (not limb.reached and away) or "limited by the leash" in limb.acting:
         return "unreachable"
     return "limited" if limb.acting else "following"
-
-
-def _because(limb: LimbStatus) -> str:
-    reasons: tuple[Reason, ...] = limb.reasons
-    return f": {reasons[0]}" if reasons else ""
 
 
 def _pose(limb: LimbStatus) -> Vector:

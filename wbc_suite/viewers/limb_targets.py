@@ -1,7 +1,7 @@
-"""Targets of the limbs that clients drag: ownership, clutch, and release."""
+"""Targets of the limbs that clients drag: who holds them, clutch, and release."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,47 +20,12 @@ REST_TIME = 0.4  # s; ... for so long
 MAX_COORDINATE = 1e3  # m; inputs beyond it are invalid
 
 
-class Ownership:
-    """Which client may move a limb: the first to take it.
-
-    It holds the limb until it releases it or sends nothing for `timeout` seconds.
-    """
-
-    def __init__(self, timeout: float = HOLD_TIMEOUT) -> None:
-        self.timeout = timeout
-        self._holder: int | None = None
-        self._last_input = 0.0
-
-    def holder(self, now: float) -> int | None:
-        """Return the client that holds the limb at time `now`, or None."""
-        self.expire(now)
-        return self._holder
-
-    def expire(self, now: float) -> bool:
-        """Release the limb if its holder has gone silent; return whether it had."""
-        silent = self._holder is not None and now - self._last_input > self.timeout
-        if silent:
-            self._holder = None
-        return silent
-
-    def take(self, client: int, now: float) -> bool:
-        """Take or keep the limb; False if another client holds it."""
-        if self.holder(now) not in (None, client):
-            return False
-        self._holder, self._last_input = client, now
-        return True
-
-    def release(self, client: int) -> bool:
-        """Release the limb; False if this client was not the holder."""
-        if self._holder != client:
-            return False
-        self._holder = None
-        return True
-
-
 @dataclass(slots=True)
 class LimbTarget:
     """A limb of the pipeline that several clients may drag; a session locks the calls.
+
+    The first client to grab it holds it until it releases it, or has sent nothing for
+    `hold_timeout`, s.
 
     Attributes:
         enabled: Whether the clutch is engaged.
@@ -70,10 +35,12 @@ class LimbTarget:
     """
 
     stages: LimbPipeline
-    ownership: Ownership = field(default_factory=Ownership)
+    hold_timeout: float = HOLD_TIMEOUT
     enabled: bool = True
     rest: int | None = None
     reported: bool = False
+    _holder: int | None = None
+    _heard: float = 0.0
 
     @property
     def info(self) -> LimbInfo:
@@ -128,11 +95,15 @@ class LimbTarget:
         target does not move then. False if another client holds the limb, the client
         has lost it by its silence, or the pose is invalid.
         """
-        holder = self.holder(now)
-        if not _is_valid(T_world_input) or (holder != client and not grab):
+        holder, near = self.holder(now), np.abs(T_world_input.translation)
+        if (
+            not (near < MAX_COORDINATE).all()
+            or not np.isfinite(T_world_input.rotation).all()
+        ):
             return False
-        if not self.ownership.take(client, now):
+        if holder != client and not (grab and holder is None):
             return False
+        self._holder, self._heard = client, now
         if self.enabled:
             if grab:
                 self.stages.release()
@@ -141,18 +112,15 @@ class LimbTarget:
 
     def holder(self, now: float) -> int | None:
         """Return the client that holds the limb; one that went silent releases it."""
-        if self.ownership.expire(now):
-            self._let_go()
-        return self.ownership.holder(now)
+        if self._holder is not None and now - self._heard > self.hold_timeout:
+            self.release(self._holder)
+        return self._holder
 
     def release(self, client: int) -> None:
         """Release the limb; its target stays, and the limb goes on towards it."""
-        if self.ownership.release(client):
-            self._let_go()
-
-    def _let_go(self) -> None:
-        self.stages.release()
-        self.rest = 0
+        if self._holder == client:
+            self._holder, self.rest = None, 0
+            self.stages.release()
 
     def enable(self, enabled: bool) -> None:
         """Engage or disengage the clutch; the target does not move."""
@@ -182,9 +150,3 @@ class LimbTarget:
             self.rest = None
             if not is_near:
                 self.stages.place(measured)
-
-
-def _is_valid(T_world_input: pin.SE3) -> bool:
-    """Return whether all numbers of a pose are finite and not excessive."""
-    near = np.abs(T_world_input.translation) < MAX_COORDINATE
-    return bool(near.all() and np.isfinite(T_world_input.rotation).all())

@@ -1,4 +1,4 @@
-"""Timing of the control loop: its period, thread priority and interpreter settings."""
+"""Timing of the control loop: its period, what is measured of it, its priority."""
 
 import contextlib
 import gc
@@ -6,10 +6,17 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from wbc_suite.typing import Vector
 
 LEAD = 3e-3  # s; for GR1 1 ms is enough, 2 ms on a shared processor
 SWITCH_INTERVAL = 1e-4  # s; at 1 ms, or Python's own 5, other threads delay the loop
+SMOOTHING = 0.03  # weight of the newest step in the displayed times
+LATENCIES = 512  # inputs over which the displayed latency is the median
 
 
 class LoopTimer:
@@ -83,6 +90,49 @@ class LoopTimer:
     def _sleep_until(self, moment: float) -> None:
         if (wait := moment - self._clock()) > 0.0:
             self._sleep(wait)
+
+
+class StepTimes:
+    """Measures how long steps take, how far apart they are, and the inputs' ages.
+
+    Attributes:
+        duration: Smoothed time from the beginning of a step to its end, s; nan before
+            one.
+        period: Smoothed time between the ends of two steps, s; nan before two.
+    """
+
+    def __init__(self) -> None:
+        self._latencies: deque[float] = deque(maxlen=LATENCIES)
+        self.duration = self.period = self._last = float("nan")
+
+    def restart(self) -> None:
+        """Leave out the time until the next step."""
+        self._last = float("nan")
+
+    def end_step(self, inputs: Iterable[float], begun: float, now: float) -> None:
+        """Note the end of a step that had inputs and began at these times, s."""
+        self._latencies.extend(max(now - arrived, 0.0) for arrived in inputs)
+        self.duration = _smoothed(self.duration, now - begun)
+        self.period = _smoothed(self.period, now - self._last)
+        self._last = now
+
+    @property
+    def latencies(self) -> Vector:
+        """Ages of the last inputs at the end of their steps, s."""
+        return np.array(self._latencies, dtype=np.float64)
+
+    @property
+    def latency(self) -> float:
+        """Median of the latencies, s; nan before any."""
+        values = self.latencies
+        return float(np.median(values)) if len(values) else float("nan")
+
+
+def _smoothed(mean: float, value: float) -> float:
+    """Return a mean with a new value; nan stands for no mean or no value."""
+    if np.isnan(mean):
+        return value
+    return mean if np.isnan(value) else mean + SMOOTHING * (value - mean)
 
 
 def prepare_interpreter() -> None:

@@ -22,7 +22,7 @@ Rgba: TypeAlias = tuple[float, float, float, float]
 
 COLLISION_GROUP = 3  # geoms of this group and above are collision geoms
 TOLERANCE = 1e-4  # m, and quaternion units: 0.2 mm at a distance of 1 m
-BARE = 0.2  # m, around the bodies of a robot without shapes
+MARGIN = 0.2  # m, around a robot
 DEFAULT_COLOR = (0.5, 0.5, 0.5, 1.0)
 """Of a geom without a colour of its own; its material's is drawn then."""
 
@@ -92,27 +92,37 @@ def relative_poses(
     return np.concatenate([local, wxyz], axis=1)
 
 
-def robot_box(
-    model: mujoco.MjModel, positions: Matrix, quaternions: Matrix
-) -> tuple[Vector, Vector]:
-    """Return two corners of a box around the first robot, m.
+def robot_box(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Vector, Vector]:
+    """Return two corners of a box around the first robot, with a margin, m.
 
-    Robots in a scene carry the prefix `robot0_`; a model without it is all robot. One
-    without shapes is around its bodies. For poses see `ModelScene.update`.
+    Robots in a scene carry the prefix `robot0_`; a model without it is all robot.
     """
     names = [model.body(body).name for body in range(model.nbody)]
     prefix = "robot0_" if any(n.startswith("robot0_") for n in names) else ""
-    own = np.array([body > 0 and n.startswith(prefix) for body, n in enumerate(names)])
-    bodies = model.geom_bodyid
-    drawn = own[bodies] & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
-    if not drawn.any():
-        low, high = positions[own].min(axis=0), positions[own].max(axis=0)
-        return low - BARE, high + BARE
-    rotations = Rotation.from_quat(quaternions[bodies], scalar_first=True)
-    centres = (positions[bodies] + rotations.apply(model.geom_pos))[drawn]
-    reach = np.abs(model.geom_aabb[drawn, :3]) + model.geom_aabb[drawn, 3:]
-    radii = np.linalg.norm(reach, axis=1, keepdims=True)
-    return (centres - radii).min(axis=0), (centres + radii).max(axis=0)
+    corners = subject_corners(model, data, prefix)
+    return corners.min(axis=0) - MARGIN, corners.max(axis=0) + MARGIN
+
+
+def subject_corners(
+    model: mujoco.MjModel, data: mujoco.MjData, subject: str = ""
+) -> Matrix:
+    """Return the corners of all geoms' boxes in the world, shape (n, 3); no planes.
+
+    Only bodies whose names start with the subject count. One without geoms is a point.
+    """
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
+    names = [model.body(body).name for body in model.geom_bodyid]
+    seen = np.array([name.startswith(subject) for name in names], dtype=bool)
+    seen &= model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+    seen &= model.geom_group < COLLISION_GROUP
+    if not seen.any():
+        own = [model.body(b).name.startswith(subject) for b in range(model.nbody)]
+        return data.xpos[own]
+    centre, half = model.geom_aabb[seen, :3], model.geom_aabb[seen, 3:]
+    local = centre[:, None] + signs * half[:, None]
+    rotation = data.geom_xmat[seen].reshape(-1, 3, 3)
+    world = data.geom_xpos[seen, None] + local @ rotation.transpose(0, 2, 1)
+    return world.reshape(-1, 3)
 
 
 def _node_names(model: mujoco.MjModel) -> list[str]:
@@ -185,10 +195,12 @@ def colored_meshes(model: mujoco.MjModel, geom: int) -> list[tuple[Rgba, Triangl
     first, start = model.mesh_faceadr[data], model.mesh_texcoordadr[data]
     corner = model.mesh_facetexcoord[first : first + len(mesh.faces), 0]
     column = (model.mesh_texcoord[start + corner, 0] * len(palette)).astype(np.int64)
-    return [
-        (_rgba([*palette[k] / 255.0, rgba[3]]), _submesh(mesh, column == k))
-        for k in np.unique(column)
-    ]
+    found = []
+    for k in np.unique(column):  # the faces of one colour, and the vertices they use
+        used, faces = np.unique(mesh.faces[column == k], return_inverse=True)
+        part = TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3))
+        found.append((_rgba([*palette[k] / 255.0, rgba[3]]), part))
+    return found
 
 
 def _rgba(values: np.ndarray | list[float]) -> Rgba:
@@ -205,9 +217,3 @@ def _pixels_of(model: mujoco.MjModel, material: int) -> np.ndarray | None:
     first = model.tex_adr[texture]
     shape = int(model.tex_height[texture]), int(model.tex_width[texture]), 3
     return model.tex_data[first : first + math.prod(shape)].reshape(shape)
-
-
-def _submesh(mesh: TriangleMesh, chosen: np.ndarray) -> TriangleMesh:
-    """Return some faces of a mesh and the vertices that they use."""
-    used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
-    return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3))

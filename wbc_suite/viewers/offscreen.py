@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.sensing.renderer import RenderPreset, make_renderer
 from wbc_suite.typing import Matrix, Vector
+from wbc_suite.viewers.model_scene import subject_corners
 
 if TYPE_CHECKING:
     from wbc_suite.robot import RobotDescription
@@ -148,8 +149,11 @@ class Camera:
         """Return a picture of a state after `mujoco.mj_forward`, with marks added."""
         self._renderer.update_scene(data, self._camera)
         scene = self._renderer.scene
-        if self._view is not None:
-            _set_field_of_view(scene, self._fov, self._view.fov)
+        if self._view is not None:  # of a free camera it is otherwise the model's
+            half = np.radians([self._view.fov, self._fov]) / 2.0
+            for camera in scene.camera:
+                camera.frustum_top *= np.tan(half[0]) / np.tan(half[1])
+                camera.frustum_bottom *= np.tan(half[0]) / np.tan(half[1])
         for mark in marks:
             mujoco.mjv_initGeom(
                 scene.geoms[scene.ngeom],
@@ -248,28 +252,6 @@ def fit_camera(view: View, points: Matrix, *, aspect: float) -> mujoco.MjvCamera
     return camera
 
 
-def subject_corners(
-    model: mujoco.MjModel, data: mujoco.MjData, subject: str = ""
-) -> Matrix:
-    """Return the corners of all geoms' boxes in the world, shape (n, 3); no planes.
-
-    Only bodies whose names start with the subject count. One without geoms is a point.
-    """
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-    names = [model.body(body).name for body in model.geom_bodyid]
-    seen = np.array([name.startswith(subject) for name in names], dtype=bool)
-    seen &= model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
-    seen &= model.geom_group < 3  # others are hidden by default in MuJoCo's viewers
-    if not seen.any():
-        own = [model.body(b).name.startswith(subject) for b in range(model.nbody)]
-        return data.xpos[own]
-    centre, half = model.geom_aabb[seen, :3], model.geom_aabb[seen, 3:]
-    local = centre[:, None] + signs * half[:, None]
-    rotation = data.geom_xmat[seen].reshape(-1, 3, 3)
-    world = data.geom_xpos[seen, None] + local @ rotation.transpose(0, 2, 1)
-    return world.reshape(-1, 3)
-
-
 def _find_view(model: mujoco.MjModel, view: View | str) -> View | None:
     """Return a view, or None for the name of a camera of the model."""
     if isinstance(view, View) or view in VIEWS:
@@ -278,11 +260,3 @@ def _find_view(model: mujoco.MjModel, view: View | str) -> View | None:
     if view not in cameras:
         raise UnknownNameError("view or camera", view, [*VIEWS, *cameras])
     return None
-
-
-def _set_field_of_view(scene: mujoco.MjvScene, old: float, new: float) -> None:
-    """Set the field of view of a free camera, which otherwise is the model's."""
-    ratio = np.tan(np.radians(new) / 2.0) / np.tan(np.radians(old) / 2.0)
-    for camera in scene.camera:
-        camera.frustum_top *= ratio
-        camera.frustum_bottom *= ratio

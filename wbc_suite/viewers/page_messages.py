@@ -5,7 +5,9 @@ element in memory, and passes on whatever numbers it gets. So the proxy of `Page
 admits only the messages that its pages use, with finite numbers.
 """
 
-from typing import Annotated, Literal, TypeAlias
+import functools
+import operator
+from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
@@ -22,70 +24,41 @@ Text: TypeAlias = Annotated[
 Point: TypeAlias = tuple[Number, Number, Number]
 Quaternion: TypeAlias = tuple[Number, Number, Number, Number]
 Pixels: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
+HANDLE = {"name": Text, "owner": Text}  # what is grabbed, dragged or released
 
 
-class _Message(msgspec.Struct, tag_field="type", tag=True, forbid_unknown_fields=True):
-    """A message; its class has the name of viser's."""
+FIELDS: dict[str, dict[str, Any]] = {
+    "ViewerCameraMessage": {  # the camera of a client
+        "wxyz": Quaternion,
+        "position": Point,
+        "look_at": Point,
+        "up_direction": Point,
+        **dict.fromkeys(("fov", "near", "far"), Number),
+        **dict.fromkeys(("image_height", "image_width"), Pixels),
+    },
+    "GuiUpdateMessage": {  # a new value of an element
+        "uuid": Text,
+        "updates": dict[Literal["value"], bool | Number | Text],
+    },
+    "CommandTriggerMessage": {"uuid": Text},  # a hotkey
+    "TransformControlsDragStartMessage": HANDLE,
+    "TransformControlsUpdateMessage": {"wxyz": Quaternion, "position": Point} | HANDLE,
+    "TransformControlsDragEndMessage": HANDLE,
+}
+"""Types of the fields of each message, by viser's names."""
 
-
-class ViewerCameraMessage(_Message):
-    """The camera of a client."""
-
-    wxyz: Quaternion
-    position: Point
-    fov: Number
-    near: Number
-    far: Number
-    image_height: Pixels
-    image_width: Pixels
-    look_at: Point
-    up_direction: Point
-
-
-class GuiUpdateMessage(_Message):
-    """A new value of an element."""
-
-    uuid: Text
-    updates: dict[Literal["value"], bool | Number | Text]
-
-
-class CommandTriggerMessage(_Message):
-    """A hotkey."""
-
-    uuid: Text
-
-
-class TransformControlsDragStartMessage(_Message):
-    """A handle is grabbed."""
-
-    name: Text
-    owner: Text = ""
-
-
-class TransformControlsUpdateMessage(_Message):
-    """A handle is dragged."""
-
-    name: Text
-    wxyz: Quaternion
-    position: Point
-    owner: Text = ""
-
-
-class TransformControlsDragEndMessage(_Message):
-    """A handle is released."""
-
-    name: Text
-    owner: Text = ""
-
-
-_decoder = msgspec.msgpack.Decoder(
-    ViewerCameraMessage
-    | GuiUpdateMessage
-    | CommandTriggerMessage
-    | TransformControlsDragStartMessage
-    | TransformControlsUpdateMessage
-    | TransformControlsDragEndMessage
-)
+_MESSAGES = [
+    msgspec.defstruct(
+        name,
+        [(n, kind, "") if n == "owner" else (n, kind) for n, kind in fields.items()],
+        tag_field="type",
+        tag=True,
+        forbid_unknown_fields=True,
+        kw_only=True,
+    )
+    for name, fields in FIELDS.items()
+]
+_decoder = msgspec.msgpack.Decoder(functools.reduce(operator.or_, _MESSAGES))
 
 
 def is_valid(message: str | bytes) -> bool:

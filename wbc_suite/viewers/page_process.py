@@ -19,13 +19,16 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from wbc_suite import logs
 from wbc_suite.errors import DeviceError
 from wbc_suite.viewers.loop_timing import raise_priority
-from wbc_suite.viewers.remote_session import QUERIES, SIGNALS, RemoteSession, serve
 
 if TYPE_CHECKING:
+    from wbc_suite.viewers.remote_session import RemoteSession
     from wbc_suite.viewers.teleop_session import TeleopSession
 
 log = logs.logger(__name__)
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+QUERIES = ("progress", "info", "snapshot", "grab")
+"""Requests of the page that have an answer, for which it waits."""
 POLL_PERIOD = 0.05  # s
 EXIT_TIMEOUT = 10.0  # s; a page that has not ended by then is killed
 
@@ -63,7 +66,7 @@ class PageProcess:
         self._pipe, remote = context.Pipe()
         arguments = remote, host, port, label, robot
         self._process = context.Process(
-            target=serve, args=arguments, name="page", daemon=True
+            target=_serve, args=arguments, name="page", daemon=True
         )
         with _signals_wait():
             self._process.start()
@@ -148,6 +151,13 @@ class PageProcess:
             if status.holder is not None:
                 self._session.leave(status.holder)
         self._session.quit.set()
+
+
+def _serve(*arguments: Any) -> None:
+    """Serve the page, in its process: this one need not import it."""
+    from wbc_suite.viewers.remote_session import serve
+
+    serve(*arguments)
 
 
 Session: TypeAlias = "TeleopSession | RemoteSession"

@@ -3,8 +3,7 @@
 viser has neither tokens nor checks of origins, so it listens on a Unix socket of this
 user only, see `PrivateViser`. The proxy listens where clients connect, admits them by
 `AccessRules`, fetches pages and relays WebSocket messages. A client that sends an
-invalid one is disconnected. The proxy adds the script of `HeldKeys` to the page, and
-style and script of `pages/page.*`.
+invalid one is disconnected. The proxy adds style and scripts of `pages/` to the page.
 """
 
 import asyncio
@@ -13,7 +12,6 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from http import HTTPStatus
-from importlib import resources
 from pathlib import Path
 from typing import TypeAlias
 from urllib.parse import quote
@@ -24,8 +22,8 @@ from aiohttp import WSMsgType, hdrs, web
 from wbc_suite import logs
 from wbc_suite.errors import DeviceError
 from wbc_suite.viewers import page_messages
-from wbc_suite.viewers.held_keys import HeldKeys
-from wbc_suite.web.server import WebServer, page_url, token_for
+from wbc_suite.viewers.held_keys import SOCKET, HeldKeys
+from wbc_suite.web.server import WebServer, file_routes, page_url, token_for
 
 log = logs.logger(__name__)
 
@@ -34,10 +32,12 @@ PORTS = range(8080, 8100)  # tried in turn if no port is given
 MESSAGE_LIMIT = 50 * 1024 * 1024  # bytes from viser, its own limit
 HEARTBEAT = 30.0  # s between pings that find clients that are gone
 
-PAGES = resources.files("wbc_suite.viewers") / "pages"
-OWN = {"/page.css": "text/css", "/page.js": "text/javascript"}
-"""Files of `PAGES` that every page loads, and their types."""
-HEAD = '<head><link rel="stylesheet" href="/page.css"><script src="/page.js"></script>'
+FILES = ("held_keys.js", "page.js", "page.css")
+HEAD = (
+    b'<head><script src="/held_keys.js"></script><script src="/page.js"></script>'
+    b'<link rel="stylesheet" href="/page.css">'
+)
+"""Start of every page: its scripts come before viser's."""
 
 DATA = (WSMsgType.TEXT, WSMsgType.BINARY)
 WebSocket: TypeAlias = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
@@ -114,13 +114,12 @@ class PageServer:
     def _rewrite(self, page: bytes) -> bytes:
         title = f"<title>{html.escape(self.title)}</title>"
         page = page.replace(b"<title>Viser</title>", title.encode(), 1)
-        page = page.replace(b"<head>", HEAD.encode(), 1)
-        return self.keys.add_script(page)
+        return page.replace(b"<head>", HEAD, 1)
 
     def _start_proxy(self, ports: Sequence[int]) -> WebServer:
         routes = [
-            *self.keys.routes,
-            *(web.get(path, _send_own) for path in OWN),
+            web.get(SOCKET, self.keys.serve),
+            *file_routes("viewers/pages", FILES),
             *proxy(self.server.path, self._rewrite, admits=page_messages.is_valid),
         ]
         for port in ports:
@@ -130,14 +129,6 @@ class PageServer:
                 if port == ports[-1]:
                     raise
         raise AssertionError("there is at least one port")
-
-
-async def _send_own(request: web.Request) -> web.Response:
-    return web.Response(
-        text=(PAGES / request.path.removeprefix("/")).read_text("utf-8"),
-        content_type=OWN[request.path],
-        headers={hdrs.CACHE_CONTROL: "no-store"},
-    )
 
 
 def proxy(
@@ -158,47 +149,38 @@ def proxy(
         target = f"http://localhost{quote(request.path)}"
         upstream = aiohttp.ClientSession(
             connector=aiohttp.UnixConnector(str(path), force_close=True),
-            auto_decompress=request.path == "/",
+            auto_decompress=False,
         )
         try:
             async with upstream:
                 if request.headers.get(hdrs.UPGRADE, "").lower() == "websocket":
                     return await _relay(request, upstream, target, admits)
-                if request.path == "/":
-                    return await _fetch_page(upstream, target, rewrite)
-                return await _fetch(request, upstream, target)
+                return await _fetch(request, upstream, target, rewrite)
         except (aiohttp.ClientError, TimeoutError):
             return web.Response(status=HTTPStatus.BAD_GATEWAY)
 
     return [web.get("/{path:.*}", handle, allow_head=False)]
 
 
-async def _fetch_page(
-    upstream: aiohttp.ClientSession, target: str, rewrite: Callable[[bytes], bytes]
-) -> web.Response:
-    """Fetch the page; it is decoded, changed and compressed."""
-    async with upstream.get(target, allow_redirects=False) as answer:
-        kind = answer.headers.get(hdrs.CONTENT_TYPE, "text/html")
-        page = web.Response(
-            status=answer.status,
-            body=rewrite(await answer.read()),
-            headers={hdrs.CONTENT_TYPE: kind},
-        )
-        page.enable_compression()
-        return page
-
-
 async def _fetch(
-    request: web.Request, upstream: aiohttp.ClientSession, target: str
+    request: web.Request,
+    upstream: aiohttp.ClientSession,
+    target: str,
+    rewrite: Callable[[bytes], bytes],
 ) -> web.Response:
-    """Fetch a page or a file; its encoding is left as it is."""
-    encoding = request.headers.get(hdrs.ACCEPT_ENCODING, "identity")
-    accepted = {hdrs.ACCEPT_ENCODING: encoding}
+    """Fetch a file in its encoding; the page is changed and compressed."""
+    is_page = request.path == "/"
+    given = "identity" if is_page else request.headers.get(hdrs.ACCEPT_ENCODING)
+    accepted = {hdrs.ACCEPT_ENCODING: given or "identity"}
     async with upstream.get(target, headers=accepted, allow_redirects=False) as answer:
         kept = (hdrs.CONTENT_TYPE, hdrs.CONTENT_ENCODING)
         headers = {k: answer.headers[k] for k in kept if k in answer.headers}
         body = await answer.read()
-        return web.Response(status=answer.status, body=body, headers=headers)
+        body = rewrite(body) if is_page else body
+        found = web.Response(status=answer.status, body=body, headers=headers)
+        if is_page:
+            found.enable_compression()
+        return found
 
 
 async def _relay(

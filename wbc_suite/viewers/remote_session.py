@@ -9,21 +9,25 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
-from wbc_suite.errors import DeviceError
+import mujoco
+
+from wbc_suite.errors import DeviceError, WbcError
+from wbc_suite.robot import load_robot
+from wbc_suite.viewers.model_scene import ModelScene, robot_box
+from wbc_suite.viewers.page_process import QUERIES, SIGNALS
+from wbc_suite.viewers.page_server import PageServer
+from wbc_suite.viewers.scene_setup import set_camera, set_up_scene
 
 if TYPE_CHECKING:
     import pinocchio as pin
 
     from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
 PROGRESS_PERIOD = 0.2  # s
-
-QUERIES = ("progress", "info", "snapshot", "grab")
-"""Requests that have an answer, for which the page waits."""
 
 COMMANDS = (
     "release",
@@ -92,13 +96,43 @@ class RemoteSession:
                 return None
 
 
+class PreparingPage:
+    """Show a robot in its first keyframe until `close`; the server goes on.
+
+    One that cannot be loaded, by its name or file, is not shown.
+    """
+
+    def __init__(self, site: PageServer, robot: str, *, label: str) -> None:
+        self.server = site.server
+        set_up_scene(site, label=label)
+        self._text = site.server.gui.add_markdown("")
+        self.show("Building the robot and its scene.")
+        with suppress(WbcError):  # the session's own error is reported
+            self._add(robot)
+
+    def show(self, text: str) -> None:
+        """Say what is being done."""
+        self._text.content = f"**Getting ready**  \n{text}"
+
+    def close(self) -> None:
+        """Remove everything from the page."""
+        self.server.scene.reset()
+        self.server.gui.reset()
+
+    def _add(self, robot: str) -> None:
+        model = load_robot(robot).to_mjspec().compile()
+        data = mujoco.MjData(model)
+        if model.nkey:
+            mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_kinematics(model, data)
+        ModelScene(self.server, model).update(data.xpos, data.xquat)
+        set_camera(self.server, robot_box(model, data))
+
+
 def serve(
     pipe: Connection, host: str, port: int | None, label: str, robot: str
 ) -> None:
     """Serve the page until the session ends: the main function of the process."""
-    from wbc_suite.viewers.page_server import PageServer
-    from wbc_suite.viewers.preparing_page import PreparingPage
-
     for number in SIGNALS:  # the session ends this process
         signal.signal(number, signal.SIG_IGN)
     session = RemoteSession(pipe)

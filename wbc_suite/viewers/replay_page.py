@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import viser
 
 PANEL_EVERY = 3  # updates
-PLOT_POINTS = 200
+PLOT_POINTS = 200  # of a curve
 EFFORT, REWARD, NOW = "#4a6fa5", "#3f8f5b", "#c8553d"
 PLAY, PAUSE, PREVIOUS, NEXT = "Play", "Pause", "Previous", "Next"
 SPEED_LABELS: dict[str, float] = dict(
@@ -36,7 +36,7 @@ KEYS: dict[str, tuple[str, Callable[[EpisodePlayer], None]]] = {
 class ReplayPage:
     """Serve a player of episodes; a thread of its own advances it and sends updates.
 
-    States are displayed in `env`, and `site`, the server, is stopped with the page.
+    States are displayed in `env`, until `site`, the server, is stopped.
     """
 
     def __init__(
@@ -50,13 +50,12 @@ class ReplayPage:
         self._status = self.server.gui.add_html("")
         self._add_controls()
         self._plot = add_plot(
-            self.server,
+            self.server.gui,
             "Norm of the action (blue), reward (green)",
             {"now": NOW, "action": EFFORT, "reward": REWARD},
         )
         self._display(player.advance())
-        data = env.simulation.data
-        box = robot_box(env.simulation.model, data.xpos, data.xquat)
+        box = robot_box(env.simulation.model, env.simulation.data)
         set_camera(self.server, box)
         self.server.on_client_connect(lambda client: add_views(client, lambda: box))
 
@@ -65,10 +64,6 @@ class ReplayPage:
         self.site.start_updates(
             lambda n: self._display(self.player.advance(), panel=n % PANEL_EVERY == 0)
         )
-
-    def stop(self) -> None:
-        """Stop, and close the server."""
-        self.site.stop()
 
     def _display(self, status: PlayerStatus, *, panel: bool = True) -> None:
         """Display the state of the playback."""

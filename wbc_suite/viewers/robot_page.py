@@ -28,7 +28,7 @@ LEAST_HALF = 1e-3  # m; thinner boxes of inertia would not be visible
 class RobotPage:
     """Serve a page that displays one robot in the posture of its sliders.
 
-    The server of the page, `site`, is stopped with the page.
+    It ends when `site`, its server, is stopped.
     """
 
     def __init__(self, robot: RobotDescription, site: PageServer) -> None:
@@ -50,11 +50,7 @@ class RobotPage:
         self._overlays = Overlays(site.server, self.model, self.data, self.scene)
         self._add_joints()
         self.set_keyframe(next(iter(robot.keyframes), None))
-        set_camera(site.server, robot_box(self.model, self.data.xpos, self.data.xquat))
-
-    def stop(self) -> None:
-        """Close the page."""
-        self.site.stop()
+        set_camera(site.server, robot_box(self.model, self.data))
 
     def set_keyframe(self, name: str | None) -> None:
         """Set a keyframe by its name; None sets every joint to zero."""

@@ -1,9 +1,9 @@
 """Floor, light, camera, theme and colours of every page."""
 
 import colorsys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +12,7 @@ from wbc_suite.typing import Vector
 
 if TYPE_CHECKING:
     import viser
+    import viser.uplot
 
     from wbc_suite.viewers.page_server import PageServer
 
@@ -29,7 +30,7 @@ VIEWS = {
     "Top": np.array([-0.15, 0.0, 1.0]),
 }
 """Direction from the robot, which faces x, to the camera."""
-BRAND = (38, 98, 132)
+BRAND = (38, 98, 132)  # red, green, blue, 0 to 255
 
 # Right is warm, left is cool, the middle of the body is green and violet.
 _BY_WORD: tuple[tuple[tuple[str, ...], Colour], ...] = (
@@ -135,25 +136,45 @@ def _camera(box: Box, direction: Vector) -> tuple[Vector, Vector]:
 
 
 def add_plot(
-    server: "viser.ViserServer",
-    title: str,
-    curves: Mapping[str, str],
-    *,
-    height: int = 150,
+    gui: "viser.GuiApi", title: str, curves: Mapping[str, str], **options: Any
 ) -> "viser.GuiUplotHandle":
-    """Add a plot over the time in s, without data; its height is in pixels.
+    """Add a plot over the time in s, without data.
 
-    `curves` is the colour of each curve in CSS notation, by its label.
+    `curves` is the colour of each curve in CSS notation, by its label; for `options`
+    see viser's `add_uplot`.
     """
-    lines = [{"label": k, "stroke": c, "width": 2} for k, c in curves.items()]
-    return server.gui.add_uplot(
-        data=tuple(np.zeros(2) for _ in range(1 + len(lines))),
-        series=({"label": "s"}, *lines),  # type: ignore[arg-type]
+    axis = {"x": {"time": False}}  # else seconds are shown as dates
+    settings = {"scales": axis, "legend": {"show": False}, "height": 150} | options
+    return gui.add_uplot(
+        data=tuple(np.zeros(2) for _ in range(1 + len(curves))),
+        series=plot_series(curves),
         title=title,
-        scales={"x": {"time": False}},
-        legend={"show": False},
-        height=height,
+        **settings,
     )
+
+
+def plot_series(
+    curves: Mapping[str, str], shown: Sequence[bool] | None = None
+) -> "tuple[viser.uplot.Series, ...]":
+    """Return the curves of a plot; those that are not shown are hidden."""
+    lines = zip(curves.items(), shown or [True] * len(curves), strict=True)
+    return (
+        {"label": "s"},
+        *(
+            {"label": label, "stroke": colour, "width": 2, "show": visible}
+            for (label, colour), visible in lines
+        ),
+    )
+
+
+def marked(labels: Iterable[str], chosen: str) -> tuple[str, ...]:
+    """Return the labels of a button group with the chosen one marked."""
+    return tuple(f"• {x} •" if x == chosen else str(x) for x in labels)
+
+
+def unmarked(label: str) -> str:
+    """Return a label without its mark."""
+    return label.strip("• ")
 
 
 def place(node: "viser.SceneNodeHandle", T_world_node: pin.SE3) -> None:
@@ -169,16 +190,14 @@ def limb_colours(names: Iterable[str]) -> MappingProxyType[str, Colour]:
     for name in names:
         known = (c for words, c in _BY_WORD if all(w in name for w in words))
         colour = next((c for c in known if c not in colours.values()), None)
-        colours[name] = colour or _spare(len(colours))
+        if colour is None:  # a muted one; the golden ratio separates neighbours
+            hue = (0.11 + 0.618 * len(colours)) % 1.0
+            r, g, b = colorsys.hls_to_rgb(hue, 0.48, 0.45)
+            colour = round(255 * r), round(255 * g), round(255 * b)
+        colours[name] = colour
     return MappingProxyType(colours)
 
 
 def css(colour: Colour) -> str:
     """Return a colour in CSS notation."""
     return f"#{colour[0]:02x}{colour[1]:02x}{colour[2]:02x}"
-
-
-def _spare(index: int) -> Colour:
-    """Return a muted colour; steps of the golden ratio separate neighbours."""
-    r, g, b = colorsys.hls_to_rgb((0.11 + 0.618 * index) % 1.0, 0.48, 0.45)
-    return round(255 * r), round(255 * g), round(255 * b)

@@ -178,7 +178,7 @@ def limbs_html(
         f"<tr><td><span style='color:{css(colours[name])}'>&#9632;</span> "
         f"{html.escape(limbs[name].title)}</td>"
         f"<td style='opacity:.75'>{html.escape(_notes(snapshot, name, client))}</td>"
-        f"<td style='text-align:right'>{_error_cell(limbs[name], status)}</td></tr>"
+        f"<td style='text-align:right'>{_error(limbs[name], status)}</td></tr>"
         for name, status in snapshot.limbs.items()
     )
     return f"<table style='width:100%;padding:.2em .7em;font-size:.88em'>{rows}</table>"
@@ -228,7 +228,7 @@ def _notes(snapshot: Snapshot, name: str, client: int) -> str:
     return ", ".join([*notes, *status.acting])
 
 
-def _error_cell(limb: LimbInfo, status: LimbStatus) -> str:
+def _error(limb: LimbInfo, status: LimbStatus) -> str:
     if limb.kind is LimbKind.ORIENTATION:
         return f"{np.rad2deg(status.orientation_error):.0f}°"
     return f"{1e3 * status.position_error:.0f} mm"

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+import mujoco
+
 from wbc_suite.devices.action_ports import LimbKind
 from wbc_suite.viewers.balance_overlay import BalanceOverlays
 from wbc_suite.viewers.camera_follower import CameraFollower
@@ -9,7 +11,12 @@ from wbc_suite.viewers.camera_pictures import CameraPictures
 from wbc_suite.viewers.drag_handles import DragHandles
 from wbc_suite.viewers.model_scene import ModelScene, robot_box
 from wbc_suite.viewers.page_server import PageServer
-from wbc_suite.viewers.scene_setup import limb_colours, set_camera, set_up_scene
+from wbc_suite.viewers.scene_setup import (
+    Box,
+    limb_colours,
+    set_camera,
+    set_up_scene,
+)
 from wbc_suite.viewers.status_text import explain
 from wbc_suite.viewers.target_markers import TargetMarkers
 from wbc_suite.viewers.teleop_panel import TeleopPanel
@@ -27,10 +34,7 @@ HAND_SCALE, OTHER_SCALE, BASE_SCALE = 0.22, 0.16, 0.4  # m
 class TeleopPage:
     """Serve a session; updates are sent by a thread of their own.
 
-    Args:
-        session: Session to display; it need not run yet.
-        site: Server of the page, which is stopped with the page.
-        label: Title of the panel.
+    The session need not run yet. `site`, the server, is stopped with the page.
     """
 
     def __init__(self, session: "Session", site: PageServer, *, label: str) -> None:
@@ -39,37 +43,37 @@ class TeleopPage:
         self.server = site.server
         set_up_scene(site, label=label)
         snapshot = session.snapshot
-        colours = limb_colours(limbs)
+        self.colours = limb_colours(limbs)
         self.scene = ModelScene(self.server, model)
         self.scene.update(snapshot.body_positions, snapshot.body_quaternions)
         self.handles = DragHandles(
             session, {n: _scale(n, limb.kind) for n, limb in limbs.items()}
         )
-        self.markers = TargetMarkers(self.server, session.info, snapshot, colours)
-        low, high = robot_box(model, snapshot.body_positions, snapshot.body_quaternions)
+        self.markers = TargetMarkers(self.server, session.info, snapshot, self.colours)
+        data = mujoco.MjData(model)
+        data.qpos[:] = snapshot.positions
+        mujoco.mj_kinematics(model, data)
+        self._box = low, high = robot_box(model, data)
         self.cameras = CameraFollower(
             model, snapshot.body_positions, (low + high) / 2.0
         )
         self.overlays = BalanceOverlays(session)
         self.pictures = CameraPictures(model, snapshot)
-        self.panel = TeleopPanel(
-            self.server,
-            session,
-            self.handles,
-            colours,
-            cameras=self.cameras,
-            overlays=self.overlays,
-            pictures=self.pictures,
-            box=lambda: (low + self.cameras.moved, high + self.cameras.moved),
-        )
+        self.panel = TeleopPanel(self)
         if self.panel.drive is not None:
             site.keys.listen(self.panel.drive.receive)
         several = any(name.startswith("robot1_") for name in limbs)
         self._names = {n: k.title for n, k in limbs.items()} if several else {}
         self._epoch = snapshot.epoch
-        set_camera(self.server, (low, high))
+        set_camera(self.server, self._box)
         self.server.on_client_connect(self._connect)
         self.server.on_client_disconnect(self._disconnect)
+
+    @property
+    def box(self) -> Box:
+        """Corners of a box around the robot, m."""
+        low, high = self._box
+        return low + self.cameras.moved, high + self.cameras.moved
 
     def start(self) -> None:
         """Start the updates."""

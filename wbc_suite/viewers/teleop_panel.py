@@ -2,21 +2,19 @@
 
 import functools
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from wbc_suite.recording.episode_control import EpisodeCommand
-from wbc_suite.viewers.balance_overlay import BalanceOverlays, legend_html
-from wbc_suite.viewers.camera_follower import CameraFollower
-from wbc_suite.viewers.camera_pictures import CameraPictures
-from wbc_suite.viewers.drag_handles import DragHandles, HandleMode
+from wbc_suite.viewers.balance_overlay import legend_html
+from wbc_suite.viewers.drag_handles import HandleMode
 from wbc_suite.viewers.drive_panel import DrivePanel
 from wbc_suite.viewers.gripper_sliders import GripperSliders
 from wbc_suite.viewers.scene_setup import (
-    Box,
-    Colour,
     add_views,
+    marked,
     set_dark,
+    unmarked,
 )
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 from wbc_suite.viewers.status_text import (
@@ -30,7 +28,7 @@ from wbc_suite.viewers.tracking_plots import TrackingPlots
 if TYPE_CHECKING:
     import viser
 
-    from wbc_suite.viewers.page_process import Session
+    from wbc_suite.viewers.teleop_page import TeleopPage
 
 RECORD_NOTE = (
     "This session has no file to record into. Start it by "
@@ -54,63 +52,41 @@ RECORD_KEYS = {
 
 
 class TeleopPanel:
-    """Status, buttons, limbs, grippers and plots.
+    """Status, buttons, limbs, grippers and plots of a page.
 
     Elements that all clients share are created once; those that each client has for
     itself are created when it connects.
-
-    Args:
-        server: Server of the page.
-        session: Session that is displayed and commanded.
-        handles: The clients' handles.
-        colours: Colour of each limb.
-        cameras: Moves cameras with the robot.
-        overlays: Draws the balance of the robot.
-        pictures: Draws what cameras see.
-        box: Returns two corners of the robot, for the cameras, m.
     """
 
-    def __init__(
-        self,
-        server: "viser.ViserServer",
-        session: "Session",
-        handles: DragHandles,
-        colours: Mapping[str, Colour],
-        *,
-        cameras: CameraFollower,
-        overlays: BalanceOverlays,
-        pictures: CameraPictures,
-        box: Callable[[], Box],
-    ) -> None:
-        self._server, self._session, self._handles = server, session, handles
-        self._colours, self._cameras, self._overlays = colours, cameras, overlays
-        self._box, self._pictures = box, pictures
+    def __init__(self, page: "TeleopPage") -> None:
+        self._page, self._session = page, page.session
+        self._gui, session = page.server.gui, page.session
         self._info = info = session.info
         self._adding = threading.Lock()
         if info.task:
-            server.gui.add_html(task_html(info.task))
-        self._status = server.gui.add_html("")
-        self._stand_up = server.gui.add_button(
+            self._gui.add_html(task_html(info.task))
+        self._status = self._gui.add_html("")
+        self._stand_up = self._gui.add_button(
             "Reset after the fall", color="red", visible=False
         )
         self._stand_up.on_click(lambda _: session.reset())
         self._add_buttons()
-        self.drive = DrivePanel(server, session) if info.drive.any() else None
+        self.drive = DrivePanel(self._gui, session) if info.drive.any() else None
         if info.limbs:
-            self._limb_folder = server.gui.add_folder("Limbs")
+            self._limb_folder = self._gui.add_folder("Limbs")
         self._limbs: dict[int, viser.GuiHtmlHandle] = {}
-        self._handle_folder = server.gui.add_folder("Handles" if info.limbs else "View")
+        self._handle_folder = self._gui.add_folder("Handles" if info.limbs else "View")
         if info.limbs:
             self._add_clutches()
         self._grippers: dict[str, GripperSliders] = {}
         if info.grippers:
-            with server.gui.add_folder("Grippers"):
+            with self._gui.add_folder("Grippers"):
                 self._grippers = {
-                    name: GripperSliders(server, session, name)
+                    name: GripperSliders(self._gui, session, name)
                     for name in info.grippers
                 }
-        with server.gui.add_folder("Tracking and timing"):
-            self.plots = TrackingPlots(server.gui, info, colours)
+        with self._gui.add_folder("Tracking and timing"):
+            self.plots = TrackingPlots(self._gui, info, page.colours)
 
     def add_client(self, client: "viser.ClientHandle") -> None:
         """Add the controls that each client has for itself."""
@@ -120,17 +96,19 @@ class TeleopPanel:
         with self._adding, self._handle_folder:
             if self._info.limbs:
                 self._add_handle_controls(client)
-            add_views(client, self._box)
-            self._pictures.add_client(client)
+            add_views(client, lambda: self._page.box)
+            self._page.pictures.add_client(client)
             if self.drive is not None:
-                follow = functools.partial(self._cameras.follow, client)
+                follow = functools.partial(self._page.cameras.follow, client)
                 _add_checkbox(client.gui, "Camera follows the robot", follow)
                 follow(True)
             if self._info.walks:
                 self._add_balance(client)
             with client.gui.add_folder("Show", expand_by_default=False):
                 for name, limb in self._info.limbs.items():
-                    show = functools.partial(self._handles.show, client.client_id, name)
+                    show = functools.partial(
+                        self._page.handles.show, client.client_id, name
+                    )
                     _add_checkbox(client.gui, limb.title, show)
                 _add_checkbox(
                     client.gui,
@@ -151,7 +129,7 @@ class TeleopPanel:
         """Add the checkbox that draws the balance for one client, and a legend."""
 
         def show(shown: bool) -> None:
-            self._overlays.show(client, shown)
+            self._page.overlays.show(client, shown)
             legend.visible = shown
 
         _add_checkbox(client.gui, "Balance", show, BALANCE_HINT, value=False)
@@ -161,10 +139,10 @@ class TeleopPanel:
         """Add mode and recall of one client's handles."""
         from viser import Icon
 
-        number = client.client_id
+        number, handles = client.client_id, self._page.handles
         mode = client.gui.add_button_group(
             "Drag to",
-            _marked(HandleMode.MOVE),
+            marked(HandleMode, HandleMode.MOVE),
             hint="Arrows move, arcs turn. Key: T",
         )
         recall = client.gui.add_button(
@@ -175,31 +153,33 @@ class TeleopPanel:
         )
 
         def set_mode(chosen: HandleMode) -> None:
-            self._handles.set_mode(number, chosen)
-            mode.options = _marked(chosen)
+            handles.set_mode(number, chosen)
+            mode.options = marked(HandleMode, chosen)
 
-        mode.on_click(lambda _: set_mode(HandleMode(mode.value.strip("• "))))
-        recall.on_click(lambda _: self._handles.recall(number))
+        mode.on_click(lambda _: set_mode(HandleMode(unmarked(mode.value))))
+        recall.on_click(lambda _: handles.recall(number))
         client.gui.add_command("Move or turn", hotkey="T").on_trigger(
-            lambda _: set_mode(self._handles.mode(number).next())
+            lambda _: set_mode(handles.mode(number).next())
         )
         client.gui.add_command("Bring handles to the limbs", hotkey="H").on_trigger(
-            lambda _: self._handles.recall(number)
+            lambda _: handles.recall(number)
         )
 
     def _add_clutches(self) -> None:
-        with self._server.gui.add_folder("Clutches", expand_by_default=False):
+        with self._gui.add_folder("Clutches", expand_by_default=False):
             for name, limb in self._info.limbs.items():
                 engage = functools.partial(self._session.enable, name)
-                _add_checkbox(self._server.gui, limb.title, engage, CLUTCH_HINT)
+                _add_checkbox(self._gui, limb.title, engage, CLUTCH_HINT)
 
     def update(self, snapshot: Snapshot) -> None:
         """Display the state of the session."""
         limbs = self._info.limbs  # viser sends only changes
-        self._status.content = status_html(snapshot, self._info, self._colours)
+        self._status.content = status_html(snapshot, self._info, self._page.colours)
         self._stand_up.visible = bool(snapshot.fell)
         for client, table in list(self._limbs.items()):
-            table.content = limbs_html(snapshot, limbs, self._colours, client=client)
+            table.content = limbs_html(
+                snapshot, limbs, self._page.colours, client=client
+            )
         if self.drive is not None:
             self.drive.update(snapshot)
         for name, sliders in self._grippers.items():
@@ -207,7 +187,7 @@ class TeleopPanel:
         self._buttons.options = _buttons(snapshot)
 
     def _add_buttons(self) -> None:
-        gui = self._server.gui
+        gui = self._gui
         self._buttons = gui.add_button_group(
             "Session", _buttons(self._session.snapshot), hint=BUTTON_HINT
         )
@@ -302,8 +282,3 @@ def _buttons(snapshot: Snapshot) -> tuple[str, ...]:
     held = snapshot.recording is not None and snapshot.recording.recording
     last = ("Keep", "Discard") if held else ("Record",)
     return ("Resume" if snapshot.paused else "Pause", "Reset", *last)
-
-
-def _marked(chosen: HandleMode) -> tuple[str, ...]:
-    """Return the labels of the modes with the chosen one marked."""
-    return tuple(f"• {mode} •" if mode is chosen else mode.value for mode in HandleMode)

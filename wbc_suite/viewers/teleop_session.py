@@ -24,9 +24,8 @@ from wbc_suite.recording.episode_control import EpisodeCommand, EpisodeControl
 from wbc_suite.typing import Vector
 from wbc_suite.viewers.balance_status import BalanceReader
 from wbc_suite.viewers.limb_targets import LimbTarget
-from wbc_suite.viewers.loop_timing import LoopTimer, raise_priority
+from wbc_suite.viewers.loop_timing import LoopTimer, StepTimes, raise_priority
 from wbc_suite.viewers.session_state import PauseOwner, SessionInfo, Snapshot
-from wbc_suite.viewers.step_times import StepTimes
 
 DEVICE_GONE = 20.0  # s; a device that is silent for so long no longer owns a pause
 DRIVE_TIMEOUT = 0.5  # s; a robot stops if the page does not repeat a velocity
@@ -208,11 +207,7 @@ class TeleopSession:
         return self.limbs[name]
 
     def start(self, *, urgent: bool = False) -> None:
-        """Run the loop in a thread, at the session's rate.
-
-        Args:
-            urgent: Whether the thread gets a real-time priority, where permitted.
-        """
+        """Run the loop in a thread, if `urgent` with a real-time priority."""
         self._stopping.clear()
         self._thread = threading.Thread(
             target=self._run, args=(urgent,), name="teleop", daemon=True

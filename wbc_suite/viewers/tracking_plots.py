@@ -8,15 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc_suite.typing import Matrix, Vector
-from wbc_suite.viewers.scene_setup import Colour, css
+from wbc_suite.viewers.scene_setup import (
+    Colour,
+    add_plot,
+    css,
+    plot_series,
+)
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 
 if TYPE_CHECKING:
     import viser
-    import viser.uplot
 
-SECONDS = 10.0
-POINTS = 150
+SECONDS = 10.0  # that are plotted
+POINTS = 150  # of a curve, at most
 ROWS = 300  # more than SECONDS at the rate of the page's updates
 LEAST_TOP = 10.0  # mm and ms, of an axis: it does not show the noise at rest
 STEP_CURVES = {"step": "#4a6fa5", "period": "#9aa5b1"}
@@ -81,16 +85,8 @@ class Plot:
         visible: bool = True,
     ) -> None:
         self._curves, self._shown, self._top = curves, [visible] * len(curves), 0.0
-        self._handle = gui.add_uplot(
-            data=tuple(np.zeros(2) for _ in range(1 + len(curves))),
-            series=self._series(),
-            title=title,
-            scales={"x": {"time": False}, "y": {"range": (0.0, LEAST_TOP)}},
-            legend={"show": False},
-            height=130,
-            padding=(10, 24, 0, 0),
-            visible=visible,
-        )
+        options = {"height": 130, "padding": (10, 24, 0, 0), "visible": visible}
+        self._handle = add_plot(gui, title, curves, **options)
 
     def update(self, ago: Vector, values: Matrix, shown: list[bool]) -> None:
         """Send values, shape (times, curves), over times, s, shape (times,).
@@ -101,7 +97,7 @@ class Plot:
         self._handle.visible = any(shown)
         if shown != self._shown:
             self._shown = shown
-            self._handle.series = self._series()
+            self._handle.series = plot_series(self._curves, shown)
         if not any(shown):
             return
         top = round_up(max(LEAST_TOP, float(values[:, shown].max())))
@@ -109,16 +105,6 @@ class Plot:
             self._top = top
             self._handle.scales = {"x": {"time": False}, "y": {"range": (0.0, top)}}
         self._handle.data = tuple(np.vstack([ago, values.T]))
-
-    def _series(self) -> "tuple[viser.uplot.Series, ...]":
-        lines = zip(self._curves.items(), self._shown, strict=True)
-        return (
-            {"label": "s"},
-            *(
-                {"label": label, "stroke": colour, "width": 2, "show": shown}
-                for (label, colour), shown in lines
-            ),
-        )
 
 
 def round_up(value: float) -> float:

@@ -21,6 +21,9 @@ import threading
 from collections.abc import Iterable
 from http import HTTPStatus
 from http.cookies import CookieError
+from importlib import resources
+from pathlib import Path
+from string import Template
 from urllib.parse import urlsplit
 
 from aiohttp import hdrs, web
@@ -34,6 +37,7 @@ logger = logs.logger(__name__)
 CONNECTIONS = 256  # at a time; a browser opens one, and a few more while it loads
 HEAD_TIMEOUT = 10.0  # s, to the first and between two complete requests
 SHUTDOWN_TIMEOUT = 0.2  # s; handlers of open WebSockets are cancelled after it
+TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 
 HEADERS = {
     hdrs.CONTENT_SECURITY_POLICY: "frame-ancestors 'none'; base-uri 'none'; "
@@ -48,6 +52,9 @@ HEADERS = {
 
 Source: OWASP, HTTP Security Response Headers Cheat Sheet
 """
+
+
+NO_STORE = {hdrs.CACHE_CONTROL: "no-store"}
 
 
 def is_loopback(host: str) -> bool:
@@ -70,6 +77,36 @@ def page_url(host: str, port: int, token: str | None, *, scheme: str = "http") -
     name = f"[{name}]" if ":" in name else name
     query = "" if token is None else f"?token={token}"
     return f"{scheme}://{name}:{port}/{query}"
+
+
+def send_file(
+    folder: str, name: str, *, policy: str = "", **values: str
+) -> web.Response:
+    """Return the answer that sends a text file of this package; nobody caches it.
+
+    Args:
+        folder: Its folder in the package, such as `viewers/pages`.
+        name: Its name.
+        policy: Content-Security-Policy of a page.
+        values: Take the place of `$NAME` in the text, as HTML.
+    """
+    text = (resources.files("wbc_suite") / folder / name).read_text("utf-8")
+    return web.Response(
+        text=Template(text).substitute(values) if values else text,
+        content_type=TYPES[Path(name).suffix],
+        headers=NO_STORE | ({hdrs.CONTENT_SECURITY_POLICY: policy} if policy else {}),
+    )
+
+
+def file_routes(
+    folder: str, names: Iterable[str], *, policy: str = ""
+) -> list[web.RouteDef]:
+    """Return routes `/NAME` of files; see `send_file`."""
+
+    async def send(request: web.Request) -> web.Response:
+        return send_file(folder, request.path[1:], policy=policy)
+
+    return [web.get(f"/{name}", send) for name in names]
 
 
 class WebServer:
@@ -270,8 +307,7 @@ def _is_foreign(request: web.Request, host: str) -> bool:
 
 
 def _response(status: HTTPStatus, text: str = "") -> web.Response:
-    headers = {hdrs.CACHE_CONTROL: "no-store"}
-    return web.Response(status=status, text=text, headers=headers)
+    return web.Response(status=status, text=text, headers=NO_STORE)
 
 
 def _same(token: str, candidate: str) -> bool:

@@ -20,11 +20,8 @@ class HeldCommand:
     The first client that sends one has it until it sends zeros, leaves, or has sent
     nothing for `timeout`. Commands of a client count once it has sent zeros: when it
     comes, and again after a command of its own ended in another way or was refused. So
-    a key that is held while the connection drops moves nothing when it is back.
-
-    Args:
-        size: Number of values.
-        timeout: Time after which a command that is not repeated is zero, s.
+    a key that is held while the connection drops moves nothing when it is back. The
+    timeout is in s.
     """
 
     def __init__(self, size: int, timeout: float) -> None:
@@ -34,14 +31,9 @@ class HeldCommand:
         self._refused = -np.inf  # when a command came from another one, s
 
     def set(self, values: ArrayLike, *, client: int, now: float) -> bool:
-        """Take a command; False if it is refused.
+        """Take a command, which zeros end; False if it is refused.
 
         That is if it is invalid, another client has one, or zeros have to come first.
-
-        Args:
-            values: The command; zeros end it.
-            client: Who sends it.
-            now: Time, s.
         """
         array = np.array(values, dtype=np.float64)
         if array.shape != self._values.shape or not np.isfinite(array).all():
@@ -85,13 +77,9 @@ class HeldCommand:
 class RobotDrive:
     """Drive one robot: its velocity moves to a goal within the limits of its rate.
 
-    Args:
-        ports: Slices that command the velocity of its base or its walk.
-        heights: Slices that command its height.
-        config: Settings of the pipeline.
-        dt: Time between two ticks, s.
-        glides: Whether it has a base whose pose is commanded.
-        lifts: Whether it has a joint that lifts its body.
+    `ports` command the velocity of its base or its walk, `heights` its height. It
+    `glides` if the pose of its base is commanded, and `lifts` if it has a joint that
+    lifts its body. `dt` is the time between two ticks, s.
 
     Attributes:
         velocity: Forward, left (m/s), turn (rad/s), up (m/s), shape (4,).
@@ -120,11 +108,7 @@ class RobotDrive:
         self.reset({part.name: np.zeros(1) for part in self._heights})
 
     def reset(self, held: dict[str, Vector]) -> None:
-        """Stop.
-
-        Args:
-            held: Values of the slices that hold the robot.
-        """
+        """Stop; `held` are the values of slices that hold the robot."""
         self._goal: Vector = np.zeros(4)
         self.velocity: Vector = np.zeros(4)
         self._height = {part.name: held[part.name].copy() for part in self._heights}

@@ -27,7 +27,7 @@ from wbc_suite.typing import Matrix, Vector
 
 TOUCH = 0.02  # m; tips of a tracked hand, inside the fingers, that touch each other
 PINCH_BEGINS = 0.06  # m; distance of tips below which it counts
-FINGER_WEIGHT, THUMB_WEIGHT = 1.0, 0.3
+FINGER_WEIGHT, THUMB_WEIGHT = 1.0, 0.3  # of squared errors in m^2
 PINCH_WEIGHT = 60.0  # of touching tips
 PRIOR = 0.004  # m; an error in position that counts as a synergy's whole half range
 DAMPING = 0.003  # m; of the steps

@@ -1,26 +1,30 @@
 """Stages of one limb: clutch, workspace, leash, filter and motion limit."""
 
+import math
+
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.devices.action_ports import LimbPort
 from wbc_suite.devices.pipeline.clutch import Clutch
-from wbc_suite.devices.pipeline.config import Leash, PipelineConfig, WorkspaceBox
+from wbc_suite.devices.pipeline.config import (
+    Leash,
+    OneEuro,
+    PipelineConfig,
+    WorkspaceBox,
+)
 from wbc_suite.devices.pipeline.motion_limit import MotionLimit
-from wbc_suite.devices.pipeline.one_euro import OneEuroFilter
 from wbc_suite.devices.state import LimbInput
 from wbc_suite.typing import Vector
 
 ROUNDING = 1e-9  # m or rad
+SPEED_CUTOFF = 1.0  # Hz, of the one-euro filter's own filter of speed, as in its source
 
 
 class LimbPipeline:
     """Compute the target of a limb from the input of a device.
 
-    Args:
-        port: The limb.
-        config: Settings of the stages.
-        dt: Time between two ticks, s.
+    `dt` is the time between two ticks, s.
 
     Attributes:
         home: Pose of the limb at the last reset.
@@ -67,9 +71,7 @@ class LimbPipeline:
     def update(self, given: LimbInput | None, pace: float = 1.0) -> Vector:
         """Advance by one tick; return the values of the limb's slice.
 
-        Args:
-            given: Input of the device; None if there is no new one.
-            pace: Fraction of the speed limits that is permitted.
+        `given` is a new input of the device, `pace` the permitted share of its speed.
         """
         if given is not None:
             self.follow(given)
@@ -158,13 +160,7 @@ def clip_to_box(target: pin.SE3, box: WorkspaceBox) -> tuple[pin.SE3, bool]:
 def clip_to_leash(
     target: pin.SE3, measured: pin.SE3, leash: Leash
 ) -> tuple[pin.SE3, bool]:
-    """Return the target moved towards the limb to within the leash, and if it is tight.
-
-    Args:
-        target: Requested pose, in the world.
-        measured: Pose of the limb.
-        leash: Greatest distance and angle between the two.
-    """
+    """Return the target, moved to within the leash of the limb, and if it is tight."""
     offset = target.translation - measured.translation
     turn = pin.log3(target.rotation @ measured.rotation.T)
     distance, angle = float(np.linalg.norm(offset)), float(np.linalg.norm(turn))
@@ -175,3 +171,44 @@ def clip_to_leash(
     if angle > leash.angle:
         rotation = pin.exp3(leash.angle / angle * turn) @ measured.rotation
     return pin.SE3(rotation, position), tight
+
+
+class OneEuroFilter:
+    """Low-pass filter of a pose with a cutoff that rises with its speed.
+
+        cutoff = cutoff_0 + rise * speed,   alpha = 1 / (1 + 1 / (2 pi cutoff dt))
+
+    Orientations are filtered along the shortest arc.
+
+    Source: Casiez, Roussel and Vogel (2012), "1 Euro Filter", CHI.
+    """
+
+    def __init__(self, config: OneEuro, dt: float) -> None:
+        self._config, self._dt = config, dt
+        self.reset(pin.SE3.Identity())
+
+    def reset(self, pose: pin.SE3) -> None:
+        """Start at rest at a pose."""
+        self._pose, self._before = pose.copy(), pose.copy()
+        self._speed = np.zeros(2)
+
+    def apply(self, target: pin.SE3) -> pin.SE3:
+        """Return the smoothed target."""
+        moved = target.translation - self._before.translation
+        turned = pin.log3(target.rotation @ self._before.rotation.T)
+        speed = np.array([np.linalg.norm(moved), np.linalg.norm(turned)]) / self._dt
+        self._speed += self._alpha(SPEED_CUTOFF) * (speed - self._speed)
+        self._before = target.copy()
+        config = self._config
+        linear = self._alpha(config.cutoff + config.linear_rise * self._speed[0])
+        angular = self._alpha(config.cutoff + config.angular_rise * self._speed[1])
+        here = self._pose
+        offset = target.translation - here.translation
+        turn = pin.log3(target.rotation @ here.rotation.T)
+        self._pose = pin.SE3(
+            pin.exp3(angular * turn) @ here.rotation, here.translation + linear * offset
+        )
+        return self._pose
+
+    def _alpha(self, cutoff: float) -> float:
+        return 1.0 / (1.0 + 1.0 / (2.0 * math.pi * cutoff * self._dt))

@@ -8,7 +8,7 @@ import pinocchio as pin
 from wbc_suite.devices.pipeline.config import RatesConfig
 from wbc_suite.typing import Vector
 
-BISECTIONS = 20
+BISECTIONS = 20  # to 1e-6 of the way between two accelerations
 STILL = 1e-12  # units, units / s and / s^2; smaller values count as zero
 
 
@@ -23,12 +23,7 @@ class LimitedMotion:
     acceleration is reduced to zero at full jerk. Reducing a by J dt satisfies all three
     if they held before, so there is always a solution. They are convex: the best
     acceleration between that one and the desired one is found by bisection. Differences
-    of the positions over dt are exactly v, a and j.
-
-    Args:
-        size: Number of coordinates.
-        rates: The bounds V, A and J.
-        dt: Time between two ticks, s.
+    of the positions over dt, s, are exactly v, a and j. The rates are V, A and J.
     """
 
     def __init__(self, size: int, rates: RatesConfig, dt: float) -> None:
@@ -47,9 +42,7 @@ class LimitedMotion:
     def step(self, error: Vector, pace: float = 1.0) -> Vector:
         """Return the step of this tick, shape (size,), towards a goal `error` away.
 
-        Args:
-            error: Goal less position.
-            pace: Fraction of the speed limit that is permitted.
+        `pace` is the share of the speed limit that is permitted.
         """
         dt = self._dt
         if self._still and float(error @ error) < STILL**2:
@@ -126,12 +119,7 @@ class MotionLimit:
         self._angular.stop()
 
     def apply(self, target: pin.SE3, pace: float = 1.0) -> pin.SE3:
-        """Move towards the target by one tick; return the new pose.
-
-        Args:
-            target: In the world.
-            pace: Fraction of the speed limits that is permitted.
-        """
+        """Move towards the target by one tick; return the new pose, in the world."""
         away = target.translation - self.pose.translation
         turn = pin.log3(target.rotation @ self.pose.rotation.T)
         step = self._linear.step(away, pace)

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc_suite.control.action import ActionSlice
 from wbc_suite.devices.action_ports import (
@@ -183,7 +182,10 @@ class Pipeline:
             counted = new if self._let_go else without_velocities(new)
             self._read(mirrored(counted) if self._mirror else counted)
         if self._watchdog.phase is not Phase.LIVE:
-            self._hold_or_return()
+            self._release()
+        if self._watchdog.phase is Phase.RETURN:
+            for name in self._driven:
+                self.limbs[name].go_home()
         self._steer(drive)
         action = self._layout.pack(self._move(), base=self._env.hold_action)
         self._report()
@@ -286,27 +288,16 @@ class Pipeline:
             before, is_base = limb.target, name in self._planar
             given = self._base_input(name) if is_base else self._inputs.get(name)
             values[name] = limb.update(given, pace)
-            if is_base:
-                self._carry(name, limb.target * before.inverse())
+            if is_base:  # it carries the robot's hands
+                for other in self.limbs.values():
+                    same = robot_of(other.port.name) == robot_of(name)
+                    if same and other.rides and other.port.kind is LimbKind.POSE:
+                        other.carry(limb.target * before.inverse())
         values |= {name: grip.update() for name, grip in self.grips.items()}
         for name, joints in self._joints.items():
             joints.lift(self._drives[robot_of(name)].velocity[3] * self._dt)
             values[name] = joints.update(pace)
         return values
-
-    def _carry(self, base: str, T_step: pin.SE3) -> None:
-        """Move the targets of a robot's hands with its base."""
-        for name, limb in self.limbs.items():
-            same = robot_of(name) == robot_of(base)
-            if limb.port.kind is LimbKind.POSE and same and limb.rides:
-                limb.carry(T_step)
-
-    def _hold_or_return(self) -> None:
-        """Hold the limbs that the device moved, or move them home."""
-        self._release()
-        if self._watchdog.phase is Phase.RETURN:
-            for name in self._driven:
-                self.limbs[name].go_home()
 
     def _release(self) -> None:
         """Let go of what the device moves; its velocities have to become zero."""
@@ -322,11 +313,8 @@ class LimbSelector:
     """Maps the names of inputs to limbs, and selects the limb of a one-hand device.
 
     An input `hand` is for the selected hand; `right` and `left` are for the hands, or
-    other limbs, of that hand's robot; any other name is that of a slice.
-
-    Args:
-        names: Names of all limbs, in the order of the action.
-        hands: Limbs that can be selected.
+    other limbs, of that hand's robot; any other name is that of a slice. `names` are
+    those of all limbs, in the order of the action; `hands` can be selected.
     """
 
     def __init__(self, names: Sequence[str], hands: Sequence[str]) -> None:

@@ -15,7 +15,7 @@ FINGERS = {
 }
 """Joints of each finger from palm to tip, in the order of WebXR; the wrist is 0."""
 
-FIST = {"thumb": 1.6}
+FIST = {"thumb": 1.6}  # rad; likewise, of its two joints
 FIST_FINGER = 3.6  # rad; sum of a finger's three joint angles in a fist
 OPEN_PINCH, CLOSED_PINCH = 0.9, 0.15  # thumb to index, in widths of the palm
 FAR_THUMB, NEAR_THUMB = 1.6, 0.5  # thumb's tip to the ring finger's root, likewise
@@ -25,10 +25,8 @@ SPREAD_WORDS = ("yaw", "rotation", "opposition", "abduction")
 def curls(joints: Matrix) -> dict[str, float]:
     """Return the flexion of each finger, 0 straight .. 1 as in a fist.
 
-    Only angles between bones count, so pose and size of the hand do not matter.
-
-    Args:
-        joints: Positions, shape (25, 3).
+    Only angles between bones count, so pose and size of the hand do not matter. The
+    positions of its joints have shape (25, 3).
     """
     found = {}
     for name, indices in FINGERS.items():
@@ -55,12 +53,8 @@ def retarget(joints: Matrix, labels: Sequence[str], *, by_pinch: bool) -> Vector
 
     A synergy named after a finger follows it; one that rotates the thumb follows its
     opposition; any other follows the mean of the four fingers. A gripper of one synergy
-    follows the pinch, and with `by_pinch` every synergy does.
-
-    Args:
-        joints: The user's hand, m, shape (25, 3).
-        labels: Names of the synergies.
-        by_pinch: Whether the whole hand follows the pinch.
+    follows the pinch, and with `by_pinch` every synergy does. The joints of the user's
+    hand are in m, shape (25, 3).
     """
     if by_pinch or len(labels) == 1:
         return np.full(len(labels), 2.0 * pinch(joints) - 1.0)

@@ -21,12 +21,8 @@ class Watchdog:
     A state is new if its time, on the device's clock, is later than all before and all
     its numbers are finite. So a device that stalls, repeats itself, goes back in time
     or sends NaN has no new data. After `hold_after` its time may start again: the
-    device was restarted. Silence is measured by `clock`, however slowly the loop runs.
-
-    Args:
-        hold_after: Time without new data before limbs are held, s.
-        return_after: Time without new data before limbs move home, s; None for never.
-        clock: Source of time that never goes back, s.
+    device was restarted. Silence is measured by `clock`, s, which never goes back,
+    however slowly the loop runs. For times see `PipelineConfig`.
 
     Attributes:
         silence: Time without new data at the last check, s; infinite before any.

@@ -22,8 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc_suite.atomic_files import new_folder, replace_file, write_bytes
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.atomic_files import new_folder, replace_file, write_bytes
+from wbc_suite.extras import import_extra
 from wbc_suite.recording.converting.layout import (
     Layout,
     Piece,
@@ -32,8 +33,7 @@ from wbc_suite.recording.converting.layout import (
 )
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
-from wbc_suite.recording.extras import import_extra
-from wbc_suite.recording.mp4_writer import Mp4Writer
+from wbc_suite.recording.video import Mp4Writer
 from wbc_suite.robot.shapes import as_table
 from wbc_suite.tomlfile import parse_json
 
@@ -65,7 +65,12 @@ def _write(
     rate, place, tasks = _rate(dataset), _place(piece.number), _tasks(dataset)
     first = dataset.episode(piece.names[0])
     writers = {
-        key: _open_video(out / f"videos/{_feature(key)}/{place}.mp4", rate)
+        key: Mp4Writer(
+            out / f"videos/{_feature(key)}/{place}.mp4",
+            rate=rate,
+            extra="lerobot",
+            options={"g": "2", "crf": "23"},  # LeRobot's: every other is a key frame
+        )
         for key in _pictures(first)
     }
     tables, rows, start = [], [], piece.start
@@ -302,12 +307,6 @@ def _all_stats(table: Any, rows: list[dict[str, Any]]) -> dict[str, Stats]:
 def _write_table(parquet: Any, table: Any, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, lambda temporary: parquet.write_table(table, temporary))
-
-
-def _open_video(path: Path, rate: float) -> Mp4Writer:
-    """Open a video with a key frame every other picture, as LeRobot writes it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return Mp4Writer(path, rate=rate, extra="lerobot", options={"g": "2", "crf": "23"})
 
 
 LAYOUT = Layout(begin=_begin, write=_write, finish=_finish, in_pieces=True)

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from wbc_suite import __version__
-from wbc_suite.recording.atomic_files import check_folder, replace_file
+from wbc_suite.atomic_files import check_folder, replace_file
+from wbc_suite.extras import import_extra
 from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
-from wbc_suite.recording.extras import import_extra
 
 SECOND = 1_000_000_000  # ns
 YEAR = 3e7  # s; no episode is as long

@@ -20,8 +20,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc_suite.atomic_files import new_folder, replace_file, write_bytes
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.atomic_files import new_folder, replace_file, write_bytes
 from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from wbc_suite.atomic_files import check_folder
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.atomic_files import check_folder
 from wbc_suite.recording.converting.layout import (
     Layout,
     Piece,

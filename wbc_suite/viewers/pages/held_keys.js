@@ -3,6 +3,7 @@
 // Whatever is held while the connection drops, or while the page is hidden or loses its
 // focus, counts as released: it has to be pressed anew. So does what is held when a page
 // connects: the first message is zeros. Sticks of a gamepad count while ENABLE is held.
+// Nothing counts before the page has a pad, an element with `data-drive`.
 "use strict";
 (() => {
   const PERIOD = 100, DEAD = 0.12;  // ms; dead zone of a stick
@@ -35,7 +36,7 @@
   }
   function send() {
     const now = axes(), text = JSON.stringify(now);
-    if (socket.readyState !== 1 || (text === last && !now.some(x => x))) return;
+    if (socket?.readyState !== 1 || (text === last && !now.some(x => x))) return;
     if (socket.bufferedAmount < 4096) { socket.send(text); last = text; }
   }
   function update() {
@@ -48,7 +49,7 @@
 
   const isText = e => e.target.closest?.("input:not([type=checkbox]), textarea, select, [contenteditable=true]");
   addEventListener("keydown", e => {
-    if (!(e.code in AXES) || e.ctrlKey || e.metaKey || e.altKey || isText(e)) return;
+    if (!socket || !(e.code in AXES) || e.ctrlKey || e.metaKey || e.altKey || isText(e)) return;
     e.stopPropagation();  // the same keys would move the camera
     if (!e.repeat) { keys.add(e.code); update(); }
   }, true);
@@ -75,6 +76,8 @@
     socket.onopen = () => { last = ""; releaseAll(); };
     socket.onclose = () => { releaseAll(); setTimeout(connect, 1000); };
   }
-  connect();
-  setInterval(send, PERIOD);
+  setInterval(() => {
+    if (socket) send();
+    else if (document.querySelector("[data-drive]")) connect();
+  }, PERIOD);
 })();

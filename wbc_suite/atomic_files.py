@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from wbc_suite.errors import DatasetError
+from wbc_suite.errors import DatasetError, WbcError
 
 RESERVE = 1 << 20  # bytes that must be left on the disk after a file is written
 
@@ -66,10 +66,12 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
             _sync(path.parent)
         finally:
             temporary.unlink(missing_ok=True)
-    except OSError as error:
+    except WbcError:
+        raise
+    except (OSError, ValueError) as error:  # ValueError: a suffix unknown to Pillow
         raise DatasetError(
-            f"'{path}' cannot be written: {error.strerror or error}. Any "
-            "existing file is unchanged."
+            f"'{path}' cannot be written: {getattr(error, 'strerror', None) or error}. "
+            "Any existing file is unchanged."
         ) from error
 
 
