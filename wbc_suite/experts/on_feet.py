@@ -25,12 +25,19 @@ STEPPED = 0.02  # m and rad
 
 
 def walk(
-    scene: ExpertScene, x: float, y: float, heading: float, *, near: float = ARRIVED
+    scene: ExpertScene,
+    x: float,
+    y: float,
+    heading: float,
+    *,
+    near: float = ARRIVED,
+    share: float = 1.0,
 ) -> Steps[bool]:
     """Walk to a place in the world, m and rad, and come to rest; return success.
 
-    It is reached where less is left than `near`, m and rad.
-    Hands that were moved keep their poses relative to the trunk.
+    It is reached where less is left than `near`, m and rad. `share` is how much of the
+    usual velocity the robot walks with at most. Hands that were moved keep their poses
+    relative to the trunk.
     """
     walker = scene.walker
     if walker is None:
@@ -38,7 +45,8 @@ def walk(
     held = [(a, walker.ground.actInv(a.goal)) for a in scene.arms if a.goal is not None]
     try:
         for _ in range(LONGEST_WALK):
-            walker.velocity = walking_velocity(walker.way_to(x, y, heading), near)
+            way = walker.way_to(x, y, heading)
+            walker.velocity = walking_velocity(way, near, share)
             if not walker.velocity.any():
                 return (yield from wait_until(lambda: walker.rests, most=SETTLE))
             for arm, pose in held:
