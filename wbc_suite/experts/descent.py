@@ -84,5 +84,5 @@ def _dexterity(J: Matrix) -> float:
     """Return a lower bound of the least singular value of a Jacobian, shape (6, n)."""
     Q, L = np.empty(J.shape), np.zeros((6, 6))
     copy_rows(J, Q)
-    lq_factor(Q, Q.shape[1], L)
+    lq_factor(Q, J.shape[1], L)
     return np.sqrt(inverse_trace(L, np.zeros(6)))
