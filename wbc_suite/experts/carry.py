@@ -23,7 +23,7 @@ WAY = (  # of a hand from its handle: outwards and up, m
 BEHIND = 0.03  # m, of a hand from its handle, towards the robot
 REACHING, RAISING, LOWERING = 0.3, 0.15, 0.1  # m/s
 RISE = 0.14  # m
-FREE = 0.03  # m, that hands go on below handles which they have left
+FREE, APART = 0.05, 0.08  # m, down and outwards, of hands that leave the handles
 BACK = 0.3  # m, that the robot steps back
 SLOWLY = 0.5  # of the velocity of a walk, with the pot on the hands
 
@@ -103,18 +103,19 @@ def _across(scene: ExpertScene[Carry]) -> Vector:
 
 
 def _put_down(scene: ExpertScene[Carry]) -> Steps[None]:
-    """Lower the hands until the pot stands and they have left its handles."""
+    """Lower the hands until the pot stands, and take them from its handles."""
+    pot = scene.benchmark
     _lower(scene, 2 * RISE)
-
-    def stands_alone() -> bool:
-        pot = scene.benchmark
-        return bool(pot.supports()) and pot.hands_at_pot() == 0
-
-    yield from wait_until(stands_alone, most=80)
-    _lower(scene, FREE)
+    yield from wait_until(lambda: bool(pot.supports()), most=80)
+    _lower(scene, FREE, apart=APART)
+    yield from wait_until(lambda: pot.hands_at_pot() == 0, most=40)
     yield from wait_until(lambda: False, most=10)
 
 
-def _lower(scene: ExpertScene[Carry], way: float) -> None:
+def _lower(scene: ExpertScene[Carry], way: float, apart: float = 0.0) -> None:
+    """Lower the hands by a way and move them apart by another, m."""
+    across = _across(scene)
     for arm in scene.arms:
-        arm.aim(shifted(arm.pose, -way * UP), speed=LOWERING, exact=False)
+        side = 1.0 if arm.hand.name == "left" else -1.0
+        goal = shifted(arm.pose, apart * side * across - way * UP)
+        arm.aim(goal, speed=LOWERING, exact=False)
