@@ -10,6 +10,7 @@ from wbc_suite.experts.arm import Arm
 from wbc_suite.experts.on_feet import walk
 from wbc_suite.experts.scene import ExpertScene, Steps, together, wait_until
 from wbc_suite.experts.skills import UP, move, shifted
+from wbc_suite.experts.walker import Walker
 from wbc_suite.typing import Vector
 
 TRIES = 3
@@ -17,13 +18,14 @@ AHEAD, BEFORE = 0.42, 0.5  # m, of the pot and of the other table's middle
 WAY = (  # of a hand from its handle: outwards and up, m
     (0.09, 0.02),
     (0.09, -0.075),
-    (-0.03, -0.075),
+    (-0.05, -0.075),  # near the pot, which slides on the hands in turns
 )
 BEHIND = 0.03  # m, of a hand from its handle, towards the robot
 REACHING, RAISING, LOWERING = 0.3, 0.15, 0.1  # m/s
 RISE = 0.14  # m
-FREE = 0.03  # m, that hands go on below handles which they have left
-BACK = 0.3  # m, that the robot steps back with empty hands
+FREE, APART = 0.05, 0.08  # m, down and outwards, of hands that leave the handles
+BACK = 0.3  # m, that the robot steps back
+SLOWLY = 0.5  # of the velocity of a walk, with the pot on the hands
 
 
 def carry(scene: ExpertScene[Carry]) -> Steps[None]:
@@ -33,15 +35,21 @@ def carry(scene: ExpertScene[Carry]) -> Steps[None]:
         return
     for _ in range(TRIES):
         yield from _raise(scene)
-        if scene.benchmark.hands_at_pot() == 2 and not scene.benchmark.supports():
+        if not scene.benchmark.supports():
             break
+    yield from walk(scene, *_behind(walker), share=SLOWLY)
     x, y, _ = walker.place
     heading = math.atan2(goal[1] - y, goal[0] - x)
-    yield from walk(scene, x, y, heading)
-    yield from walk(scene, *_before(goal, heading, BEFORE))
+    yield from walk(scene, x, y, heading, share=SLOWLY)
+    yield from walk(scene, *_before(goal, heading, BEFORE), share=SLOWLY)
     yield from _put_down(scene)
+    yield from walk(scene, *_behind(walker))
+
+
+def _behind(walker: Walker) -> tuple[float, float, float]:
+    """Return a place away from a table, whose edge a thigh meets in a turn, m, rad."""
     x, y, heading = walker.place
-    yield from walk(scene, *_before((x, y, 0.0), heading, BACK))
+    return _before((x, y, 0.0), heading, BACK)
 
 
 def _before(
@@ -95,18 +103,19 @@ def _across(scene: ExpertScene[Carry]) -> Vector:
 
 
 def _put_down(scene: ExpertScene[Carry]) -> Steps[None]:
-    """Lower the hands until the pot stands and they have left its handles."""
+    """Lower the hands until the pot stands, and take them from its handles."""
+    pot = scene.benchmark
     _lower(scene, 2 * RISE)
-
-    def stands_alone() -> bool:
-        pot = scene.benchmark
-        return bool(pot.supports()) and pot.hands_at_pot() == 0
-
-    yield from wait_until(stands_alone, most=80)
-    _lower(scene, FREE)
+    yield from wait_until(lambda: bool(pot.supports()), most=80)
+    _lower(scene, FREE, apart=APART)
+    yield from wait_until(lambda: pot.hands_at_pot() == 0, most=40)
     yield from wait_until(lambda: False, most=10)
 
 
-def _lower(scene: ExpertScene[Carry], way: float) -> None:
+def _lower(scene: ExpertScene[Carry], way: float, apart: float = 0.0) -> None:
+    """Lower the hands by a way and move them apart by another, m."""
+    across = _across(scene)
     for arm in scene.arms:
-        arm.aim(shifted(arm.pose, -way * UP), speed=LOWERING, exact=False)
+        side = 1.0 if arm.hand.name == "left" else -1.0
+        goal = shifted(arm.pose, apart * side * across - way * UP)
+        arm.aim(goal, speed=LOWERING, exact=False)

@@ -8,18 +8,13 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control import RobotState
+from wbc_suite.experts.descent import cost_of, descend
 from wbc_suite.kinematics import Configuration
-from wbc_suite.linear_algebra import inverse_trace, lq_factor
+from wbc_suite.kinematics.forward import JointKind, robot_arrays
 from wbc_suite.qp import FrameTask, PositionLimit, PostureTask, TaskStack, VelocityLimit
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Vector
 
-STEP = 0.1  # s, time of one iteration
-ITERATIONS = 60  # for each pose at most
-STUCK = 2e-3  # rad or m, of joints in an iteration
-CLOSE = 1e-3  # m and rad
-SPAN = 3  # iterations, over which progress is measured
 SWEEP = 0.4  # of the greatest velocity of joints, on a sweep
-SINGULAR = 0.05  # dexterity below which controllers lag
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -29,7 +24,7 @@ class Prediction:
     Attributes:
         error: Largest error at a pose, m, with 0.1 m for each rad.
         margin: Least distance of a joint from its limits at a pose, rad or m.
-        dexterity: Least `_dexterity` on the way.
+        dexterity: Least singular value of the hands' Jacobians on the way, from below.
         times: Time of each joint at its greatest velocity, s.
         q: Configurations at the poses.
     """
@@ -48,10 +43,7 @@ class Prediction:
     @property
     def cost(self) -> float:
         """Duration, and penalties of what is out of reach, near limits or singular."""
-        near = max(0.0, 0.2 - self.margin)
-        singular = 20.0 * max(0.0, SINGULAR - self.dexterity)
-        far = 100.0 * max(0.0, self.error - CLOSE)
-        return self.duration + far + 10.0 * near + singular
+        return cost_of(self.duration, self.error, self.margin, self.dexterity)
 
 
 class LookAhead:
@@ -59,14 +51,16 @@ class LookAhead:
 
     Args:
         state: The robot.
-        joints: The joints that move the hands; others stay where they are.
+        joints: The joints that move the hands; others stay where they are, and those
+            that only Pinocchio computes, such as balls in sockets.
         frames: The frame of each hand.
     """
 
     def __init__(self, state: RobotState, joints: Sequence[str], *frames: str) -> None:
         self._state, self._frames = state, frames
         model = state.robot.to_pinocchio()
-        moving = {*joints}
+        kinds = zip(model.names, robot_arrays(model).kind.tolist(), strict=True)
+        moving = {name for name, kind in kinds if kind != JointKind.OTHER} & {*joints}
         locked = [i for i, n in enumerate(model.names) if i and n not in moving]
         self._start = state.q
         reduced = pin.buildReducedModel(model, locked, self._start)
@@ -154,47 +148,17 @@ class LookAhead:
 
     def _descend(self, before: Prediction, most: float) -> Prediction:
         """Move to the targets of the tasks; return what was met up to there."""
-        configuration, left, earlier = self._configuration, np.inf, np.inf
-        travel, least = np.zeros(configuration.nv), before.dexterity
+        times, met = before.times.copy(), (before.error, before.margin)
         self._stack.reset()
-        for k in range(1, ITERATIONS + 1):
-            step = self._stack.solve(STEP).dq
-            configuration.update(configuration.integrate(step))
-            travel += np.abs(step)
-            for frame in self._frames:
-                least = min(least, _dexterity(configuration.frame_jacobian(frame)))
-            left = self._error()
-            if left < CLOSE or np.abs(step).max() < STUCK:
-                break
-            if most < np.inf and k % SPAN == 0:
-                to_come = (ITERATIONS - k) * (earlier - left) / SPAN
-                hopeful = self._met(before, travel, least, max(left - to_come, 0.0))
-                if hopeful.cost > most:
-                    break
-                earlier = left
-        met = self._met(before, travel, least, left)
-        q = configuration.q[self._limited]
+        error, dexterity = descend(
+            self._stack.arrays, self._speed, times, *met, before.dexterity, most
+        )
+        q = self._configuration.q[self._limited]
         gaps = np.minimum(q - self._low, self._high - q)
-        return replace(met, margin=min(before.margin, float(gaps.min(initial=np.inf))))
-
-    def _met(
-        self, before: Prediction, travel: Vector, least: float, error: float
-    ) -> Prediction:
-        """Return a prediction with how far joints went since, and what they met."""
         return replace(
             before,
             error=max(before.error, error),
-            dexterity=least,
-            times=before.times + travel / self._speed,
+            margin=min(before.margin, float(gaps.min(initial=np.inf))),
+            dexterity=dexterity,
+            times=times,
         )
-
-    def _error(self) -> float:
-        errors = [task.error(self._configuration).tolist() for task in self._tasks]
-        return max(math.hypot(*e[:3]) + 0.1 * math.hypot(*e[3:]) for e in errors)
-
-
-def _dexterity(J: Matrix) -> float:
-    """Return a lower bound of the least singular value of a Jacobian, shape (6, n)."""
-    Q, L = np.ascontiguousarray(J), np.zeros((6, 6))
-    lq_factor(Q, Q.shape[1], L)
-    return float(inverse_trace(L, np.zeros(6))) ** 0.5

@@ -14,6 +14,7 @@ ASIDE = 0.04  # m, from the middle of a quadrant
 AWAY = 0.12  # m, to withdraw
 TALLEST = 0.16  # m, of the objects, with some room for fingers
 CLEAR = 0.03  # m, above the walls of the bins
+LOW, LANDED = 0.004, 0.004  # m, above where an object comes to lie, when it is let go
 
 
 def pick_place(scene: ExpertScene[PickPlace]) -> Steps[None]:
@@ -34,7 +35,7 @@ def _place(scene: ExpertScene[PickPlace], name: str) -> Steps[None]:
     x, y = scene.benchmark.goal(name)
     lying = scene.pose(name)
     height = lying.translation[2] - config.source.center[2]
-    middle = np.array([x, y, config.target.center[2] + height + 0.004])
+    middle = np.array([x, y, config.target.center[2] + height + LOW])
     over = config.target.size[2] + CLEAR
     hands = [arm.home.translation - middle for arm in scene.arms]
     dx, dy, _ = ASIDE * np.sign(min(hands, key=np.linalg.norm))  # towards the nearest
@@ -58,6 +59,6 @@ def _place(scene: ExpertScene[PickPlace], name: str) -> Steps[None]:
     arm = choice.arm
     yield from carry(scene, arm, name, above, tolerance=0.02, turn_tolerance=0.1)
     yield from carry(
-        scene, arm, name, at, tolerance=0.01, turn_tolerance=0.1, speed=0.3
+        scene, arm, name, at, tolerance=LANDED, turn_tolerance=0.1, speed=0.15
     )
     yield from release(arm, back=AWAY)

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from wbc_suite.benchmark import ObjectBenchmark
 from wbc_suite.control import RobotState
+from wbc_suite.control.composite import WholeBodyID
 from wbc_suite.devices.action_ports import LimbKind, LimbPort, limb_ports
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError
@@ -216,17 +217,25 @@ class ExpertScene(Generic[B]):
 def _joints(state: RobotState, controller: object, hand: Hand) -> tuple[str, ...]:
     """Return the joints that a controller moves a hand by.
 
-    The trunk of a robot on its feet stays where the controller holds it.
+    What a robot on its feet keeps upright stays where the controller holds it.
     """
     parts = getattr(controller, "parts", None)
     if parts is None:
-        model = state.robot.to_pinocchio()
-        chain = model.supports[model.frames[model.getFrameId(hand.frame)].parentJoint]
-        held = state.robot.root_joint_names if state.robot.root.kind == "free" else ()
-        names = [model.names[joint] for joint in chain.tolist()[1:]]
-        return tuple(name for name in names if name not in held)
+        free = state.robot.root.kind == "free"
+        held = {*(state.robot.root_joint_names if free else ())}
+        if isinstance(controller, WholeBodyID):
+            for link in controller.config.upright:
+                held.update(_joints_of(state, link.frame))
+        return tuple(x for x in _joints_of(state, hand.frame) if x not in held)
     part = parts.get(hand.name) or next(iter(parts.values()))
     return part.law.joints
+
+
+def _joints_of(state: RobotState, frame: str) -> list[str]:
+    """Return the joints from the root to a frame."""
+    model = state.robot.to_pinocchio()
+    chain = model.supports[model.frames[model.getFrameId(frame)].parentJoint]
+    return [model.names[joint] for joint in chain.tolist()[1:]]
 
 
 @contextmanager

@@ -63,10 +63,10 @@ def walker_of(env: RobotEnv, standing: Standing | None) -> Walker | None:
     return None
 
 
-def walking_velocity(way: Vector, near: float) -> Vector:
+def walking_velocity(way: Vector, near: float, share: float) -> Vector:
     """Return the velocity for a way that is left: forward, left, m, and turn, rad.
 
-    It is zero where less is left than `near`, m and rad.
+    It is zero where less is left than `near`, m and rad; `share` is of `FASTEST`.
 
     A robot that is far away turns to where it walks, without sidesteps.
     """
@@ -77,4 +77,4 @@ def walking_velocity(way: Vector, near: float) -> Vector:
         turn = math.atan2(left, forward)
         if abs(turn) > ASIDE:
             forward = left = 0.0
-    return np.clip([forward, left, turn], -FASTEST, FASTEST)
+    return np.clip([forward, left, turn], -share * FASTEST, share * FASTEST)
