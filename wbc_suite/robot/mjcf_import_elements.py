@@ -6,7 +6,6 @@ from typing import Any
 import mujoco
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from wbc_suite import logs
 from wbc_suite.robot.importing import NameTable
@@ -180,7 +179,8 @@ def read_keyframes(
             start = int(m.jnt_qposadr[j])
             quat = m.key_qpos[k, start : start + 4]
             limit = float(m.jnt_range[j, 1]) if m.jnt_limited[j] else np.inf
-            angles = Rotation.from_quat(quat, scalar_first=True).as_euler("XYZ")
+            R = pose_at(np.zeros(3), quat).rotation  # R_x(a) R_y(b) R_z(c)
+            angles = -pin.rpy.matrixToRpy(R.T)
             values |= dict(zip(own, angles.clip(-limit, limit).tolist(), strict=True))
         found[names.take(m.key(k).name or f"key{k}", "keyframe")] = values
     return found

@@ -5,7 +5,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from wbc_suite.robot.elements import Link, rigid_bodies
 from wbc_suite.robot.shapes import Posed, ShapeFields
@@ -27,7 +26,7 @@ def se3_of(posed: HasPose) -> pin.SE3:
 
 def rotation_matrix(posed: HasPose) -> Matrix:
     """Return the orientation of an item as a matrix, shape (3, 3)."""
-    return Rotation.from_quat(posed.quat, scalar_first=True).as_matrix()
+    return pin.Quaternion(*posed.quat).matrix()
 
 
 def pose_fields(pose: Any) -> dict[str, Any]:
