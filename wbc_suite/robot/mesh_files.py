@@ -5,6 +5,8 @@ import importlib.util
 import io
 import os
 from contextlib import suppress
+from functools import cached_property
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from wbc_suite.typing import Indices, Matrix
 READABLE = (".stl", ".obj")  # suffixes of the files that need no extra
 COLLADA, GLTF = ".dae", ".glb"
 MAX_BYTES = 100_000_000  # largest mesh file that is read
+MAX_FILES = 20_000  # of a folder that is searched for meshes
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
 """One record of a binary STL file, which begins with 80 bytes and a count."""
@@ -29,6 +32,35 @@ EDGE = 0.008
 MIN_TRIANGLES = 400  # number of triangles below which a skin is not decimated
 AGGRESSION = 5.0  # how quickly edges are collapsed; the default of 7 tears thin shells
 CACHE_VERSION = 1  # raised when the content of the cache changes
+
+
+class MeshIndex:
+    """The meshes among the first `MAX_FILES` files of a folder, found by their ends."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def find(self, file: Path) -> Path | None:
+        """Return the only file with the longest common end, ignoring case."""
+        named = self._by_name.get(file.name.casefold(), [])
+        longest = max((_common_end(path, file) for path in named), default=0)
+        best = [path for path in named if _common_end(path, file) == longest]
+        return best[0] if len(best) == 1 else None
+
+    @cached_property
+    def _by_name(self) -> dict[str, list[Path]]:
+        found: dict[str, list[Path]] = {}
+        for path in islice(self._folder.rglob("*"), MAX_FILES):
+            if path.suffix.casefold() in (*READABLE, COLLADA, GLTF):
+                found.setdefault(path.name.casefold(), []).append(path)
+        return found
+
+
+def _common_end(one: Path, other: Path) -> int:
+    """Return how many trailing parts of two paths are equal, ignoring case."""
+    pairs = zip(reversed(one.parts), reversed(other.parts), strict=False)
+    same = (a.casefold() == b.casefold() for a, b in pairs)
+    return sum(takewhile(bool, same))
 
 
 def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:

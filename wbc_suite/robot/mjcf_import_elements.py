@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite import logs
-from wbc_suite.robot.importing import NameTable
+from wbc_suite.robot.adopt.importing import NameTable
 from wbc_suite.robot.poses import pose_at, pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.typing import Vector

@@ -4,7 +4,7 @@ Everything here is computed at export: no mesh file is read or shipped.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -115,6 +115,12 @@ def shape_bounds(shape: Shape) -> tuple[Vector, Vector]:
     for corner in bounds:
         corner.flags.writeable = False
     return bounds
+
+
+def bounds_of(shapes: Iterable[Shape]) -> tuple[Vector, Vector]:
+    """Compute the corners of a box around one or more shapes, in the link frame."""
+    bounds = np.array([shape_bounds(shape) for shape in shapes])
+    return bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
 
 
 def farthest_point(shapes: Sequence[Shape]) -> tuple[float, ...]:

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from wbc_suite.robot.elements import Frame, Link, rigid_bodies
-from wbc_suite.robot.name_words import (
+from wbc_suite.robot.adopt.name_words import (
     END_WORDS,
     FINGERS,
     KIND_OF,
@@ -18,10 +17,11 @@ from wbc_suite.robot.name_words import (
     words_in,
     words_of,
 )
+from wbc_suite.robot.elements import Frame, Link, rigid_bodies
 from wbc_suite.robot.shape_geometry import farthest_point
 
 if TYPE_CHECKING:
-    from wbc_suite.robot.importing import NameTable
+    from wbc_suite.robot.adopt.importing import NameTable
 
 END_OF = {
     "arm": "eef",
