@@ -78,7 +78,7 @@ class MeshFolder:
             )
         if unread:
             LOG.warning(
-                "%s: left out %d meshes that are not STL or OBJ (to read them: "
+                "%s: left out %d meshes that are not STL, OBJ or GLB (to read them: "
                 "pip install 'wbc-suite[skins]'): %s.",
                 *(self._urdf, len(unread), join_first(unread)),
             )
