@@ -20,6 +20,7 @@ GEOM = mujoco.mjtGeom
 TERRAINS = (GEOM.mjGEOM_PLANE, GEOM.mjGEOM_HFIELD, GEOM.mjGEOM_SDF)
 """Geoms that robots do not have."""
 DEFAULTS = {"friction": (1.0, 0.005, 0.0001), "solref": (0.02, 1.0)}
+"""MuJoCo's defaults of contacts; `solref` is a time in s and a damping ratio."""
 
 
 def read_shapes(

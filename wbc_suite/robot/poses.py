@@ -62,7 +62,7 @@ def poses_in_rigid_bodies(links: Sequence[Link]) -> dict[str, Any]:
 
 
 def joint_motion(axis: Vector, value: float, *, slide: bool) -> Any:
-    """Return the displacement of a slide (m) or hinge (rad) joint, `pinocchio.SE3`."""
+    """Return the displacement of a slide (m) or hinge (rad) with a unit axis (3,)."""
     if slide:
         return pin.SE3(np.eye(3), value * axis)
     return pin.SE3(pin.AngleAxis(value, axis).matrix(), np.zeros(3))

@@ -32,7 +32,7 @@ class MeshFolder:
         self._shapes: dict[tuple[str | float, ...], dict[str, Any] | None] = {}
 
     def hull(self, filename: str, scale: Vector) -> dict[str, Any] | None:
-        """Return the fields of a mesh's hull; None if it is missing or unreadable."""
+        """Return the fields of a hull, scaled (3,); None without a readable mesh."""
         key = (filename, *scale.tolist())
         if key not in self._shapes:
             path = self.find(filename)

@@ -7,7 +7,7 @@ from wbc_suite.typing import Indices, Matrix, Vector
 
 
 def solid_geoms(model: mujoco.MjModel) -> Indices:
-    """Return the geoms that collide."""
+    """Return the geoms that collide, shape (n,)."""
     return np.flatnonzero(model.geom_contype | model.geom_conaffinity)
 
 

@@ -88,7 +88,7 @@ def suits(top: Surface, height: float) -> bool:
 
 
 def still_geoms(m: mujoco.MjModel) -> Indices:
-    """Return the geoms, planes excepted, that collide and cannot move."""
+    """Return the geoms but planes that collide and cannot move, shape (n,)."""
     solid, planes = solid_geoms(m), mujoco.mjtGeom.mjGEOM_PLANE
     still = m.body_weldid[m.geom_bodyid[solid]] == 0
     return solid[still & (m.geom_type[solid] != planes)]

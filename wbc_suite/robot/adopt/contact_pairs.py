@@ -1,7 +1,7 @@
 """Pairs of links that need not collide, found by sampling postures."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
 
@@ -19,7 +19,7 @@ LOG = logs.logger(__name__)
 
 OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
 NEVER_NEARER = 0.01  # m; links that never come nearer never touch
-POSTURES = 2000
+POSTURES = 2000  # random ones; a share of a quarter is known to 0.01 (binomial)
 MAX_OVERLAP_SHARE, MAX_FALSE_SHARE = 0.25, 0.2
 """Shares of random postures: in which shapes overlap, and in which capsules do while
 the shapes are not near."""
@@ -67,21 +67,19 @@ def exclude_contacts(robot: RobotDescription, source: Path) -> RobotDescription:
             or capsules[pair] - near[pair] > MAX_FALSE_SHARE * POSTURES
         ):
             often.append(pair)
-    for pairs, what in (
-        (at_ready, "these links overlap in the posture ready and"),
-        (
-            often,
-            "these links, or the capsules around them, overlap in many random postures "
-            "and",
-        ),
-    ):
-        if pairs:
-            shown = [" and ".join(f"'{name}'" for name in sorted(p)) for p in pairs]
-            listed = join_first(shown, limit=12)
-            LOG.warning("%s: %s will not collide: %s.", source, what, listed)
+    _warn(source, at_ready, "these links overlap in the posture ready")
+    subject = "these links, or the capsules around them,"
+    _warn(source, often, f"{subject} overlap in many random postures")
     found = [(a, b) for a, b in map(sorted, (*at_ready, *apart, *often))]
     contacts = Contacts(exclude=(*robot.contacts.exclude, *found))
     return robot.model_copy(update={"contacts": contacts})
+
+
+def _warn(source: Path, pairs: Sequence[frozenset[str]], why: str) -> None:
+    shown = [" and ".join(f"'{name}'" for name in sorted(pair)) for pair in pairs]
+    if shown:
+        listed = join_first(shown, limit=12)
+        LOG.warning("%s: %s and will not collide: %s.", source, why, listed)
 
 
 def _of_capsules(robot: RobotDescription) -> RobotDescription:

@@ -45,7 +45,7 @@ def feet_are_level(robot: RobotDescription) -> bool:
 
 
 def wheel_axis(robot: RobotDescription, frame: str) -> Vector | None:
-    """Return the axis of a foot's link that turns without limits through its frame."""
+    """Return the axis (3,) of a foot's link that turns without limits at its frame."""
     joint = robot.link(robot.link_of(frame)).joint
     if joint is None or joint.range is not None:
         return None
