@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from wbc_suite.errors import DescriptionError
@@ -199,6 +198,8 @@ def convex_hull(points: Matrix, *, most: int = -1) -> tuple[Matrix, Indices]:
     Raises:
         DescriptionError: If the points lie in a plane.
     """
+    import mujoco  # not needed by who only computes with a robot
+
     spec = mujoco.MjSpec()
     spec.add_mesh(
         name="hull",
