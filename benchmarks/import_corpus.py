@@ -34,7 +34,7 @@ from harness.report import Report, options
 from wbc_suite.envs.hold_check import hold_faults
 from wbc_suite.errors import WbcError
 from wbc_suite.robot import RobotDescription, load_robot
-from wbc_suite.robot.importing import WEAK_LIFTS
+from wbc_suite.robot.adopt.importing import WEAK_LIFTS
 from wbc_suite.robot.xml_files import Element, read_xml
 
 DEVELOPED_WITH = (

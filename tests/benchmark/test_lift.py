@@ -6,6 +6,7 @@ from posing import fingers
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.robot import load_robot
+from wbc_suite.scene.objects import box
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +68,7 @@ AT_EDGES = [  # false successes that benchmarks/false_success.py found
 @pytest.mark.parametrize(("cube", "robot"), AT_EDGES)
 def test_a_cube_that_fingers_clamp_at_an_edge_is_not_lifted(env, cube, robot):
     env.reset(seed=0)
-    env.benchmark.states["cube"].resize_box([0.021459] * 3, density=700.0)
+    env.benchmark.states["cube"].reshape(box("cube", (0.021459,) * 3))
     env.simulation.data.qpos[:] = cube + robot
     mujoco.mj_forward(env.simulation.model, env.simulation.data)
     hand = env.benchmark.hands[0]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from wbc_suite.robot.importing import NameTable
+from wbc_suite.robot.adopt.importing import NameTable
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from wbc_suite.errors import DescriptionError
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.missing_data import DENSITY, GRAVITY, RESERVE, ROTOR
+from wbc_suite.robot.adopt.missing_data import DENSITY, GRAVITY, RESERVE, ROTOR
 
 BALL = '<geometry><sphere radius="0.1"/></geometry>'
 ARM = """<robot name="arm"><link name="base"/>

@@ -3,7 +3,7 @@
 import pytest
 
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.name_words import side_of, words_in, words_of
+from wbc_suite.robot.adopt.name_words import side_of, words_in, words_of
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from wbc_suite.robot.assembly import describe_component
 from wbc_suite.robot.mjcf_export import build_mjspec
 from wbc_suite.robot.robot_file import Component
 from wbc_suite.robot.shape_geometry import (
+    convex_hull,
     fit_hull,
     mesh_of,
     shape_bounds,
@@ -239,3 +240,17 @@ def test_a_flat_cloud_becomes_a_thin_box(count):
     assert fields["shape"] == "box"
     assert min(fields["size"]) == 1e-3
     np.testing.assert_allclose(fields["pos"][2], 0.0)
+
+
+@pytest.mark.parametrize(
+    "scale", [(1.0, 1.0, 1.0), (1e-3, 1e-3, 1e-3), (0.3, 0.02, 1e-3)]
+)
+def test_hulls_are_those_of_scipy_with_faces_outward(scale):
+    points = np.random.default_rng(5).normal(size=(300, 3)) * scale
+    corners, faces = convex_hull(points)
+    expected = ConvexHull(points)
+    np.testing.assert_array_equal(corners, points[np.sort(expected.vertices)])
+    places = [np.flatnonzero((points == c).all(axis=1)).item() for c in corners]
+    ours = {tuple(sorted(np.array(places)[face])) for face in faces}
+    assert ours == {tuple(sorted(face)) for face in expected.simplices.tolist()}
+    np.testing.assert_allclose(signed_volume(corners, faces), expected.volume)

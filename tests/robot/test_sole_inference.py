@@ -4,7 +4,7 @@ import pytest
 
 from wbc_suite.control import load_composite_controller_config
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.sole_inference import ball_radius, guess_sole
+from wbc_suite.robot.adopt.soles import ball_radius, guess_sole
 
 CORNER = """<collision><origin xyz="{x} {y} -0.03"/>
 <geometry><sphere radius="0.005"/></geometry></collision>"""

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.contact_pairs import exclude_by_sampling
+from wbc_suite.robot.adopt.contact_pairs import exclude_contacts
 
 LINK = """<link name="{name}"><inertial><origin xyz="0 0 0.15"/><mass value="1"/>
   <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
@@ -92,9 +92,10 @@ def test_links_whose_hulls_overlap_in_many_postures_are_excluded(tmp_path, caplo
     links = arm().replace(wide, '<sphere radius="0.3"/>', 1)  # past the second link
     path.write_text(f'<robot name="r">{LINK.format(name="body")}{links}</robot>')
     robot = load_robot(path)
-    robot = robot.model_copy(update={"contacts": type(robot.contacts)()})
+    upright = {"ready": dict.fromkeys(robot.joint_names, 0.0)}
+    changes = {"contacts": type(robot.contacts)(), "keyframes": upright}
     caplog.clear()
-    sampled = exclude_by_sampling(robot, path)
+    sampled = exclude_contacts(robot.model_copy(update=changes), path)
     assert "overlap in many random postures" in caplog.text
     assert "'arm_link_0' and 'arm_link_2'" in caplog.text
     excluded = {frozenset(pair) for pair in sampled.contacts.exclude}

@@ -19,7 +19,7 @@ def scene(*things):
 def test_a_resized_box_is_the_box_compiled_at_that_size():
     size, density = (0.03, 0.02, 0.05), 650.0
     model, data = scene(objects.box("b", (0.01, 0.02, 0.015)))
-    ObjectState(model, data, "b").resize_box(size, density=density)
+    ObjectState(model, data, "b").reshape(objects.box("b", size, density=density))
     wanted, _ = scene(objects.box("b", size, density=density))
     for field in (
         *("geom_size", "geom_aabb", "geom_rbound", "bvh_aabb", "body_mass"),
@@ -32,7 +32,7 @@ def test_a_resized_box_is_the_box_compiled_at_that_size():
 def test_a_box_that_grew_touches_at_its_new_size():
     model, data = scene(objects.box("b", (0.01, 0.01, 0.01)))
     state = ObjectState(model, data, "b")
-    state.resize_box((0.02, 0.02, 0.02), density=700.0)
+    state.reshape(objects.box("b", (0.02, 0.02, 0.02)))
     state.move((0.0, 0.0, 0.0199))
     mujoco.mj_forward(model, data)
     assert data.ncon == 4

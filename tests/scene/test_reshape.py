@@ -93,15 +93,6 @@ def test_the_mass_matrix_is_that_of_the_new_sizes(name):
     )
 
 
-def test_the_mass_matrix_of_a_resized_box_is_that_of_its_size():
-    model, data = scene(box("x", (0.02, 0.02, 0.02)))
-    ObjectState(model, data, "x").resize_box((0.05, 0.03, 0.04), density=700.0)
-    expected = scene(box("x", (0.05, 0.03, 0.04), density=700.0))
-    np.testing.assert_allclose(
-        mass_matrix(model, data), mass_matrix(*expected), atol=1e-12
-    )
-
-
 def test_shapes_change_back():
     first, second = PAIRS["hammer"]
     model, data = scene(first)

@@ -12,7 +12,6 @@ from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmar
 from wbc_suite.robot.elements import Channel
 from wbc_suite.robot.shapes import SizeInterval
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras
-from wbc_suite.scene.materials import MATERIALS
 from wbc_suite.scene.objects import SceneObject, box
 from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.sensing.reading import Reading
@@ -79,8 +78,7 @@ class Lift(ObjectBenchmark):
     def reset(self, rng: np.random.Generator) -> None:
         """Draw size and pose of the cube on the table."""
         half = rng.uniform(*self.config.cube.half_size)
-        density = MATERIALS["wood"].density
-        self.states[CUBE].resize_box((half, half, half), density=density)
+        self.states[CUBE].reshape(box(CUBE, (half, half, half)))
         super().reset(rng)
 
     def observables(self) -> dict[str, Reading]:

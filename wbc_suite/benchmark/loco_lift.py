@@ -20,7 +20,6 @@ from wbc_suite.benchmark.standing import (
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras
-from wbc_suite.scene.materials import MATERIALS
 from wbc_suite.scene.objects import SceneObject, box
 from wbc_suite.scene.placement import UniformSampler
 from wbc_suite.sensing.reading import Reading, computed
@@ -103,8 +102,7 @@ class LocoLift(ObjectBenchmark):
         (x, y, _), (length, _, _) = self.config.table.center, self.config.table.size
         self.standing.start_before((x - length / 2, y), self.config.start, rng)
         half = rng.uniform(*self.config.cube.half_size)
-        density = MATERIALS["wood"].density
-        self.states[CUBE].resize_box((half, half, half), density=density)
+        self.states[CUBE].reshape(box(CUBE, (half, half, half)))
         super().reset(rng)
 
     def observables(self) -> dict[str, Reading]:

@@ -216,7 +216,7 @@ def _robot(file: Path, **given: Any) -> tuple[str, dict[str, list[str]]]:
 
 def _inferred(robot: "RobotDescription") -> dict[str, list[str]]:
     """Return what an import inferred, as texts."""
-    from wbc_suite.robot.gripper_inference import infer_grippers
+    from wbc_suite.robot.adopt.grippers import infer_grippers
 
     grippers, ready = infer_grippers(robot), robot.keyframe("ready")
     return {

@@ -148,12 +148,12 @@ class Configuration:
         return tuple(units)
 
     def support(self, frame: str | int) -> Indices:
-        """Return the velocity indices that move a frame, ascending."""
+        """Return the velocity indices that move a frame, ascending, shape (n,)."""
         joint = self.model.frames[self._resolve(frame)].parentJoint
         return self.joint_support(joint)
 
     def joint_support(self, joint: int) -> Indices:
-        """Return the velocity indices that move a joint, with its own, ascending."""
+        """Return the velocity indices that move a joint, with its own, shape (n,)."""
         indices: list[int] = []
         for j in list(self.model.supports[joint])[1:]:  # without the universe
             first = int(self.model.joints[j].idx_v)
@@ -223,7 +223,7 @@ def _root_indices(model: pin.Model) -> tuple[Indices, Indices]:
 def random_configuration(
     model: pin.Model, q: Vector, rng: np.random.Generator
 ) -> Vector:
-    """Return q with every limited joint drawn uniformly from its range."""
+    """Return q, shape (nq,), with limited joints drawn uniformly from their ranges."""
     drawn = q.copy()
     for joint in list(model.joints)[1:]:
         low = model.lowerPositionLimit[joint.idx_q]

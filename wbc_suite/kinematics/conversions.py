@@ -113,7 +113,7 @@ class Conversion:
         return v
 
     def v_to_mujoco(self, qpos: Vector, v: Vector, out: Vector | None = None) -> Vector:
-        """Return `v_mj = B^-1 v_pin`, full MuJoCo size."""
+        """Return `v_mj = B^-1 v_pin`, shape (nv of MuJoCo,)."""
         qvel = np.zeros(self.nv_mujoco) if out is None else out
         qvel[self.v_index] = v
         for free in self._free:
@@ -121,7 +121,7 @@ class Conversion:
         return qvel
 
     def a_to_pinocchio(self, qpos: Vector, qvel: Vector, qacc: Vector) -> Vector:
-        """Return Pinocchio's acceleration: `a_lin = R^T a_world - w x v_body`.
+        """Return Pinocchio's acceleration (nv,): `a_lin = R^T a_world - w x v_body`.
 
         With `qacc = 0`, `pin.rnea` of it gives the bias force: `bias_mj = B^T rnea(q,
         v, a)`.
@@ -133,7 +133,7 @@ class Conversion:
         return a
 
     def a_to_mujoco(self, qpos: Vector, qvel: Vector, a: Vector) -> Vector:
-        """Return MuJoCo's acceleration: `a_world = R (a_lin + w x v_body)`."""
+        """Return MuJoCo's acceleration (nv,): `a_world = R (a_lin + w x v_body)`."""
         v = self.v_to_pinocchio(qpos, qvel)
         classical = np.array(a, dtype=np.float64)
         for free in self._free:

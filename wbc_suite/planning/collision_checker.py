@@ -42,7 +42,7 @@ class SceneCollisionChecker:
     def clearance(self, q: Vector) -> float:
         """Return the distance of the deepest new contact from a collision, m.
 
-        It is infinite without a contact.
+        It is infinite without a contact; q has the shape (nq,).
         """
         scene, data = self._scene, self._data
         data.qpos[:] = scene.qpos
@@ -92,7 +92,7 @@ class LimitChecker:
         self._h: Vector = np.zeros(rows)
 
     def clearance(self, q: Vector) -> float:
-        """Return the least distance beyond a limit's margin, m.
+        """Return the least distance beyond a limit's margin at q (nq,), m.
 
         It is infinite where all links are beyond the limits' influence. Where motors
         cannot hold the weight it is below zero, by what they lack, N m or N.

@@ -125,7 +125,7 @@ class GoalSearch:
     def start(
         self, starts: Sequence[Vector], held: Vector, trail: Sequence[TimedState] = ()
     ) -> None:
-        """Begin at initial configurations, best first; the tasks have their targets.
+        """Begin at initial configurations (nq,), best first; tasks have their targets.
 
         Frames of equalities are held as they are at `held`. The trail has earlier
         states of the robot, the latest first.

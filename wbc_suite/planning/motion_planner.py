@@ -19,7 +19,7 @@ MAX_PATH_TIME = 90.0  # s at full speed; of all lines that RRT-Connect checks
 CHECKED_SPEED = 0.1
 """rad/s or m/s, at least, by which lines are measured: the lift of PR2's trunk goes at
 0.013 m/s, and alone would take all checks."""
-SHORTCUTS = 600
+SHORTCUTS = 600  # that are tried on a trajectory
 MIN_CLEARANCE = 0.015  # m; closer links are slowed down, so a short path takes long
 CATCH_UP_LIMIT = 0.03  # s; with more to catch up, a robot replans
 FIXED_TIME = 0.03  # s; how far ahead of the robot a motion may still change
@@ -32,6 +32,8 @@ RETRACE_SCALE = 8.0  # of the accelerations: recorded velocities have steps
 
 class MotionPlanner:
     """Plans motions under velocity and acceleration limits, shape (nv,) each.
+
+    Configurations and goals have the shape (nq,).
 
     Args:
         model: The robot.

@@ -11,7 +11,7 @@ from wbc_suite.planning.shortcutting import shorten_path
 from wbc_suite.typing import Vector
 
 STRIDE = 0.25  # s; how far a tree grows at once
-SHORTCUTS = 80
+SHORTCUTS = 80  # that are tried on a path
 LOCAL_SHARE = 0.7  # share of the samples that are drawn near the two ends
 LOCAL_TIME = 0.6  # s; how near
 
@@ -61,7 +61,8 @@ class RRTConnect:
     ) -> Iterator[list[Vector] | None]:
         """Yield None now and then, and at last a path with both ends, if one was found.
 
-        It is passed through on straight lines. The start need not be free. The random
+        Configurations have the shape (nq,) and are joined by straight lines. The start
+        need not be free. The random
         numbers are the same in every call.
         """
         rng = np.random.default_rng(0)

@@ -10,7 +10,7 @@ State = tuple[Vector, Vector]
 
 NO_MOTION = 1e-9  # rad or m
 SCALES = 60  # velocity scales that are tried between two states of a trail
-MAX_SCALE = 50.0
+MAX_SCALE = 50.0  # of recorded velocities
 
 
 class ProfileGenerator:
@@ -46,7 +46,7 @@ class ProfileGenerator:
         return self._calculate(given)
 
     def line(self, start: Vector, end: Vector) -> ruckig.Trajectory:
-        """Return the fastest profile from rest to rest on a straight line."""
+        """Return the fastest profile from rest to rest on a straight line, (nv,)."""
         moved, still = np.maximum(np.abs(end - start), NO_MOTION), np.zeros_like(start)
         given = self._input((start, still), (end, still))
         given.max_velocity = float((self.speed / moved).min()) * moved

@@ -58,7 +58,7 @@ class Segment:
     def check_positions(
         self, spacing: float, *, begin: float = 0.0
     ) -> Iterator[Vector]:
-        """Yield positions to check from a time on, at most a spacing (s) apart.
+        """Yield positions (nv,) from a time on, at most a spacing (s) apart.
 
         Coarse steps are first: collisions are found early.
         """
@@ -87,7 +87,7 @@ class Trajectory:
 
     @property
     def end(self) -> Vector:
-        """Final positions."""
+        """Final positions, shape (nv,)."""
         return self.state(self.duration)[0]
 
     def state(self, time: float) -> State:
@@ -134,8 +134,8 @@ class TimedState:
 class Motion:
     """A trajectory in the tangent space of a configuration, and how far it is followed.
 
-    Positions of the trajectory are counted from the origin, a configuration. The clock
-    is the time on the trajectory, s.
+    Positions of the trajectory, shape (nv,), are counted from the origin, a
+    configuration, shape (nq,). The clock is the time on the trajectory, s.
     """
 
     def __init__(

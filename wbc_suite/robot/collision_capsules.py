@@ -8,14 +8,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import rigid_bodies
 from wbc_suite.robot.poses import rotation_matrix
-from wbc_suite.robot.shape_geometry import hull_spheres, support_points
+from wbc_suite.robot.shape_geometry import (
+    convex_hull,
+    hull_spheres,
+    support_points,
+)
 from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 MAX_STRIPS = 4  # largest number of capsules for a flat box
 NEAR_HULL, WIDE = 0.03, 0.15
@@ -169,9 +172,18 @@ def _around_box(size: Vector) -> list[Segment]:
 
 def _around_hull(points: Matrix) -> list[Segment]:
     """Return capsules around the hull of points, cut where that brings them nearer."""
-    planes = ConvexHull(points, qhull_options="QJ").equations
+    points, faces = convex_hull(points)
+    planes = _face_planes(points, faces)
     reach, _ = _pieces(points, planes, 0)
     return _pieces(points, planes, 3 if reach > WIDE else 2)[1]
+
+
+def _face_planes(points: Matrix, faces: Indices) -> Matrix:
+    """Return outward normals n and offsets d of faces, n x + d = 0, shape (m, 4)."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.column_stack([normals, -np.einsum("ij,ij->i", normals, a)])
 
 
 def _pieces(points: Matrix, planes: Matrix, cuts: int) -> tuple[float, list[Segment]]:
@@ -194,8 +206,8 @@ def _halves(points: Matrix) -> Iterator[tuple[Matrix, Matrix]]:
 
     Both have the points where the cut goes through an edge.
     """
-    hull = ConvexHull(points, qhull_options="QJ")
-    edges = hull.simplices[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    points, faces = convex_hull(points)
+    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     for along in points.T:
         middle = (along.min() + along.max()) / 2
         low = along < middle

@@ -1,5 +1,6 @@
 """`RobotDescription`: a complete robot, and the exports to each engine."""
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -130,8 +131,11 @@ class RobotDescription(Elements):
 
     def keyframe(self, name: str) -> dict[str, float]:
         """Return the values of all joints in a posture; followers are computed."""
-        given = look_up("keyframe", name, self.keyframes)
-        values = dict.fromkeys(self.joint_names, 0.0) | given
+        return self.posture(look_up("keyframe", name, self.keyframes))
+
+    def posture(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Return all joints' values, 0 if not given; followers are computed."""
+        values = {**dict.fromkeys(self.joint_names, 0.0), **given}
         for joint in self.joints:
             if joint.mimic is not None:
                 leader = values[joint.mimic.joint]

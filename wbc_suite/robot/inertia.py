@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.robot.shape_geometry import shape_bounds
+from wbc_suite.robot.shape_geometry import bounds_of
 from wbc_suite.typing import Matrix, Vector
 
 if TYPE_CHECKING:
@@ -83,9 +83,7 @@ def implausible(link: "Link") -> Iterator[tuple[Literal["com", "inertia"], str]]
     shapes = [*link.visual, *link.collision]
     if not shapes or link.mass == 0.0:
         return
-    bounds = [shape_bounds(shape) for shape in shapes]
-    low = np.min([b[0] for b in bounds], axis=0)
-    high = np.max([b[1] for b in bounds], axis=0)
+    low, high = bounds_of(shapes)
     slack = COM_SLACK * (high - low) + 0.005
     com = np.asarray(link.com)
     outside = float(np.max(np.maximum(low - slack - com, com - high - slack)))

@@ -86,7 +86,7 @@ def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescr
 
     One whose free root is `asked` for keeps it.
     """
-    from wbc_suite.robot.importing import with_soles
+    from wbc_suite.robot.adopt.importing import with_soles
 
     feet = any(frame.role == "foot" for frame in robot.frames)
     if robot.hands and not feet and not asked:

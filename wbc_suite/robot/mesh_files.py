@@ -5,6 +5,8 @@ import importlib.util
 import io
 import os
 from contextlib import suppress
+from functools import cached_property
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +18,10 @@ from wbc_suite.files import check_file, read_bytes
 from wbc_suite.robot.shapes import SkinMesh, Vector3, cached_by_shape
 from wbc_suite.typing import Indices, Matrix
 
-READABLE = (".stl", ".obj")  # suffixes of the files that need no extra
-COLLADA, GLTF = ".dae", ".glb"
+READABLE = (".stl", ".obj", ".glb")  # suffixes of the files that need no extra
+COLLADA = ".dae"
 MAX_BYTES = 100_000_000  # largest mesh file that is read
-
-TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
-"""One record of a binary STL file, which begins with 80 bytes and a count."""
-HEADER = 84
+MAX_FILES = 20_000  # of a folder that is searched for meshes
 
 EDGE = 0.008
 """Edge length in m to which skins are decimated; finer meshes render slowly."""
@@ -31,60 +30,79 @@ AGGRESSION = 5.0  # how quickly edges are collapsed; the default of 7 tears thin
 CACHE_VERSION = 1  # raised when the content of the cache changes
 
 
+class MeshIndex:
+    """The meshes among the first `MAX_FILES` files of a folder, found by their ends."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def find(self, file: Path) -> Path | None:
+        """Return the only file with the longest common end, ignoring case."""
+        named = self._by_name.get(file.name.casefold(), [])
+        longest = max((_common_end(path, file) for path in named), default=0)
+        best = [path for path in named if _common_end(path, file) == longest]
+        return best[0] if len(best) == 1 else None
+
+    @cached_property
+    def _by_name(self) -> dict[str, list[Path]]:
+        found: dict[str, list[Path]] = {}
+        for path in islice(self._folder.rglob("*"), MAX_FILES):
+            if path.suffix.casefold() in (*READABLE, COLLADA):
+                found.setdefault(path.name.casefold(), []).append(path)
+        return found
+
+
+def _common_end(one: Path, other: Path) -> int:
+    """Return how many trailing parts of two paths are equal, ignoring case."""
+    pairs = zip(reversed(one.parts), reversed(other.parts), strict=False)
+    same = (a.casefold() == b.casefold() for a, b in pairs)
+    return sum(takewhile(bool, same))
+
+
 def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:
     """Write triangles, shape (m, 3) into vertices (n, 3), as a binary STL file."""
-    records = np.zeros(len(faces), dtype=TRIANGLE)
-    corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    records["normal"] = normal / np.where(length > 0.0, length, 1.0)
-    records["corners"] = corners
+    mesh = _trimesh().Trimesh(vertices, faces, process=False)
     path.parent.mkdir(parents=True, exist_ok=True)
-    count = np.array([len(faces)], dtype="<u4").tobytes()
-    path.write_bytes(b"\0" * (HEADER - len(count)) + count + records.tobytes())
+    path.write_bytes(mesh.export(file_type="stl"))
 
 
 def can_read(path: Path) -> bool:
     """Whether `read_points` can read a file, by its suffix and the installed extra."""
     suffix = path.suffix.lower()
-    needed = {COLLADA: ("trimesh", "collada"), GLTF: ("trimesh",)}.get(suffix, ())
-    installed = all(importlib.util.find_spec(name) for name in needed)
-    return suffix in READABLE or (bool(needed) and installed)
+    collada = suffix == COLLADA and importlib.util.find_spec("collada") is not None
+    return suffix in READABLE or collada
 
 
 def read_points(path: Path) -> Matrix:
-    """Read the vertices (n, 3) of an STL, OBJ, COLLADA or glTF file.
+    """Read the vertices (n, 3) of an STL, OBJ, COLLADA or glTF file, m.
 
     Raises:
         DescriptionError: If it is not a mesh.
     """
-    if path.suffix.lower() not in READABLE:
-        try:
-            return np.unique(_read_mesh(path, (1.0, 1.0, 1.0))[0], axis=0)
-        except ConfigError as error:
-            raise DescriptionError(str(error)) from error
     data = read_bytes(path, most=MAX_BYTES, error=DescriptionError)
     try:
-        count = int.from_bytes(data[HEADER - 4 : HEADER], "little")  # in a binary STL
-        if path.suffix.lower() == ".obj":
-            points = _text_points(data, b"v")
-        elif len(data) == HEADER + count * TRIANGLE.itemsize:
-            records = np.frombuffer(data, dtype=TRIANGLE, offset=HEADER)
-            points = records["corners"].reshape(-1, 3)
-        else:
-            points = _text_points(data, b"vertex")
-    except ValueError as error:
+        points = _vertices(_loaded(path, data))
+    except Exception as error:  # trimesh raises anything for a malformed file
         raise DescriptionError(f"{path}: not a readable mesh: {error}.") from error
-    if len(points) == 0 or not np.isfinite(points).all():
+    if points.shape[1:] != (3,) or not len(points) or not np.isfinite(points).all():
         raise DescriptionError(f"{path}: not a readable mesh: no finite points.")
-    return np.unique(points.astype(np.float64), axis=0)
+    return np.unique(points, axis=0)
 
 
-def _text_points(data: bytes, keyword: bytes) -> Matrix:
-    """Read the lines `keyword x y z` of a text file."""
-    rows = (line.split() for line in data.splitlines())
-    points = [row[1:4] for row in rows if row and row[0] == keyword]
-    return np.array(points, dtype=np.float64).reshape(-1, 3)
+def _trimesh() -> Any:
+    """Import trimesh, which takes 0.3 s and has no types."""
+    return importlib.import_module("trimesh")
+
+
+def _loaded(path: Path, data: bytes) -> Any:
+    """Return trimesh's mesh of a file, or its points if it has no faces."""
+    # by its content, since trimesh would open the files that a path's file names
+    kind = path.suffix[1:].lower()
+    with np.errstate(invalid="ignore"):  # of NaN, which is refused
+        scene = _trimesh().load_scene(
+            io.BytesIO(data), file_type=kind, process=False, skip_materials=True
+        )
+        return scene.to_geometry()
 
 
 @cached_by_shape
@@ -116,21 +134,21 @@ def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
 
 def _read_mesh(path: Path, scale: Vector3) -> tuple[Matrix, Indices]:
     """Read a file; equal points are merged, so that decimation keeps the surface."""
-    # by its content, since trimesh would open the files that a path's file names
-    content = io.BytesIO(read_bytes(path, most=MAX_BYTES))
-    trimesh = _import_extra("trimesh")
+    data = read_bytes(path, most=MAX_BYTES)
     try:
-        kind = path.suffix[1:].lower()
-        mesh = trimesh.load_mesh(content, file_type=kind, skip_materials=True)
+        mesh = _loaded(path, data)
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
-        factor, times, _ = str(mesh.units).partition(" * ")  # "0.0254 * meters"
-        metres = float(factor) if times else 1.0
         # a reflection turns the faces inside out
         faces = mesh.faces[:, ::-1] if np.prod(scale) < 0.0 else mesh.faces
-        vertices = np.asarray(mesh.vertices) * scale * metres
-        return _checked(vertices, np.asarray(faces))
+        return _checked(_vertices(mesh) * scale, np.asarray(faces))
     except Exception as error:  # trimesh raises anything for a malformed file
         raise ConfigError(f"{path}: not a readable mesh: {error}.") from error
+
+
+def _vertices(mesh: Any) -> Matrix:
+    """Return the vertices of trimesh's mesh, m."""
+    factor, times, _ = str(mesh.units).partition(" * ")  # "0.0254 * meters"
+    return np.asarray(mesh.vertices, np.float64) * (float(factor) if times else 1.0)
 
 
 def _checked(vertices: Matrix, faces: Indices) -> tuple[Matrix, Indices]:

@@ -12,12 +12,12 @@ import re
 from typing import Any, Literal, TypeVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError
 from wbc_suite.robot.elements import Elements, Joint, Link, Name
 from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
-from wbc_suite.robot.poses import HasPose, rotation_matrix
+from wbc_suite.robot.poses import HasPose, pose_fields, rotation_matrix
 from wbc_suite.robot.shapes import Capsule, Cylinder, Hull, Loft, Shape
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
@@ -135,14 +135,12 @@ class _Reflection:
 
     def _moved(self, posed: HasPose, d: Matrix) -> dict[str, Any]:
         """Return the pose `D p`, `D R S` of an item whose inside is reflected by S."""
-        quat = posed.quat
-        if np.array_equal(d, self._s):
-            axis = -np.diag(self._s)  # exact: a rotation's axis goes to -S a
-            turned = (quat[0], *_floats(axis * np.asarray(quat[1:])))
-        else:
-            rotation = Rotation.from_matrix(d @ rotation_matrix(posed) @ self._s)
-            turned = tuple(rotation.as_quat(scalar_first=True).tolist())
-        return {"pos": _floats(d @ np.asarray(posed.pos)), "quat": turned}
+        quat, pos = posed.quat, _floats(d @ np.asarray(posed.pos))
+        if not np.array_equal(d, self._s):
+            R = d @ rotation_matrix(posed) @ self._s
+            return pose_fields(pin.SE3(R, np.array(pos)))
+        axis = -np.diag(self._s)  # exact: a rotation's axis goes to -S a
+        return {"pos": pos, "quat": (quat[0], *_floats(axis * np.asarray(quat[1:])))}
 
     def _joint(self, joint: Joint, d: Matrix, given: Joint | None) -> Joint:
         axis = np.asarray(joint.axis)

@@ -20,7 +20,7 @@ MAX_FILES = 50
 """Largest number of XML files of a model; what is attached twice counts twice."""
 MAX_READ, MAX_BYTES = 100_000, 32_000_000  # elements and bytes in all of them
 MAX_FILE = 200_000_000  # largest mesh or picture file, bytes
-MAX_PIXELS = 20_000_000
+MAX_PIXELS = 20_000_000  # of a picture; 60 MB as RGB
 
 ARCHIVES = (".zip", ".mjz")  # MuJoCo unpacks them, whatever their size
 _FOLDERS = {"texture": "texturedir", "include": "", "model": ""}

@@ -10,14 +10,14 @@ import pinocchio as pin
 
 from wbc_suite import logs
 from wbc_suite.errors import DescriptionError, join_first
-from wbc_suite.robot.contact_pairs import exclude_by_sampling, exclude_overlapping
-from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.importing import (
+from wbc_suite.robot.adopt.contact_pairs import exclude_contacts
+from wbc_suite.robot.adopt.importing import (
     UNLIMITED_RANGE,
     LinkFields,
     NameTable,
     describe_import,
 )
+from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.inertia import inertia_fields
 from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.mjcf_export import SENSOR_TYPES
@@ -76,7 +76,7 @@ def read_mjcf(
     if not _world_children(m):
         raise DescriptionError(f"{path}: the model has no body.")
     robot = _Importer(m, path, strict=strict).robot()
-    return exclude_by_sampling(exclude_overlapping(robot, path), path)
+    return exclude_contacts(robot, path)
 
 
 def _robot_roots(m: mujoco.MjModel) -> list[int]:

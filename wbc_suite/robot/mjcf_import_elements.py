@@ -6,10 +6,9 @@ from typing import Any
 import mujoco
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from wbc_suite import logs
-from wbc_suite.robot.importing import NameTable
+from wbc_suite.robot.adopt.importing import NameTable
 from wbc_suite.robot.poses import pose_at, pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.typing import Vector
@@ -21,6 +20,7 @@ GEOM = mujoco.mjtGeom
 TERRAINS = (GEOM.mjGEOM_PLANE, GEOM.mjGEOM_HFIELD, GEOM.mjGEOM_SDF)
 """Geoms that robots do not have."""
 DEFAULTS = {"friction": (1.0, 0.005, 0.0001), "solref": (0.02, 1.0)}
+"""MuJoCo's defaults of contacts; `solref` is a time in s and a damping ratio."""
 
 
 def read_shapes(
@@ -180,7 +180,8 @@ def read_keyframes(
             start = int(m.jnt_qposadr[j])
             quat = m.key_qpos[k, start : start + 4]
             limit = float(m.jnt_range[j, 1]) if m.jnt_limited[j] else np.inf
-            angles = Rotation.from_quat(quat, scalar_first=True).as_euler("XYZ")
+            R = pose_at(np.zeros(3), quat).rotation  # R_x(a) R_y(b) R_z(c)
+            angles = -pin.rpy.matrixToRpy(R.T)
             values |= dict(zip(own, angles.clip(-limit, limit).tolist(), strict=True))
         found[names.take(m.key(k).name or f"key{k}", "keyframe")] = values
     return found

@@ -5,7 +5,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from wbc_suite.robot.elements import Link, rigid_bodies
 from wbc_suite.robot.shapes import Posed, ShapeFields
@@ -27,7 +26,7 @@ def se3_of(posed: HasPose) -> pin.SE3:
 
 def rotation_matrix(posed: HasPose) -> Matrix:
     """Return the orientation of an item as a matrix, shape (3, 3)."""
-    return Rotation.from_quat(posed.quat, scalar_first=True).as_matrix()
+    return pin.Quaternion(*posed.quat).matrix()
 
 
 def pose_fields(pose: Any) -> dict[str, Any]:
@@ -63,7 +62,7 @@ def poses_in_rigid_bodies(links: Sequence[Link]) -> dict[str, Any]:
 
 
 def joint_motion(axis: Vector, value: float, *, slide: bool) -> Any:
-    """Return the displacement of a slide (m) or hinge (rad) joint, `pinocchio.SE3`."""
+    """Return the displacement of a slide (m) or hinge (rad) with a unit axis (3,)."""
     if slide:
         return pin.SE3(np.eye(3), value * axis)
     return pin.SE3(pin.AngleAxis(value, axis).matrix(), np.zeros(3))

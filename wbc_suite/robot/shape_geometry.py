@@ -4,12 +4,11 @@ Everything here is computed at export: no mesh file is read or shipped.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from wbc_suite.errors import DescriptionError
 from wbc_suite.robot.mesh_files import skin_triangles
@@ -55,7 +54,7 @@ def _mesh_of(shape: Shape) -> tuple[Matrix, Indices] | None:
     if isinstance(shape, Loft):
         mesh = _loft_mesh(shape)
     elif isinstance(shape, Hull) or rounded or cone:
-        mesh = _convex_hull(support_points(shape))
+        mesh = convex_hull(support_points(shape))
     else:
         return None
     for array in mesh:
@@ -117,6 +116,12 @@ def shape_bounds(shape: Shape) -> tuple[Vector, Vector]:
     return bounds
 
 
+def bounds_of(shapes: Iterable[Shape]) -> tuple[Vector, Vector]:
+    """Compute the corners of a box around one or more shapes, in the link frame."""
+    bounds = np.array([shape_bounds(shape) for shape in shapes])
+    return bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+
+
 def farthest_point(shapes: Sequence[Shape]) -> tuple[float, ...]:
     """Return the centre of the sphere or corner that is farthest from the origin."""
     points = np.zeros((1, 3))
@@ -158,7 +163,7 @@ def _icosphere(subdivisions: int) -> Matrix:
     vertices: Matrix = np.array([np.roll(p, k) for p in points for k in range(3)])
     vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
     for _ in range(subdivisions):
-        faces = ConvexHull(vertices).simplices
+        faces = convex_hull(vertices)[1]
         edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         edges = np.unique(np.sort(edges, axis=1), axis=0)
         middle = vertices[edges].sum(axis=1)
@@ -183,22 +188,33 @@ def _ring_angles(size: float) -> Vector:
     return np.linspace(0, 2 * np.pi, n, endpoint=False)
 
 
-def _convex_hull(points: Matrix) -> tuple[Matrix, Indices]:
-    """Compute the convex hull with outward, counter-clockwise faces."""
+def convex_hull(points: Matrix, *, most: int = -1) -> tuple[Matrix, Indices]:
+    """Compute the convex hull of points (n, 3): its corners, and triangles of these.
+
+    Faces, shape (m, 3), are counter-clockwise from outside. `most` is the largest
+    number of corners, those farthest out; -1 for all of them. MuJoCo computes it:
+    `scipy.spatial`, which gives the same, takes 0.5 s to import.
+
+    Raises:
+        DescriptionError: If the points lie in a plane.
+    """
+    import mujoco  # not needed by who only computes with a robot
+
+    spec = mujoco.MjSpec()
+    spec.add_mesh(
+        name="hull",
+        uservert=points.ravel().tolist(),
+        maxhullvert=most,
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+    )
     try:
-        hull = ConvexHull(points)
-    except QhullError as error:
+        faces = spec.compile().mesh_face
+    except ValueError as error:
         raise DescriptionError(
             "A hull is flat or a single point: give its spheres a radius."
         ) from error
-    used = np.unique(hull.simplices)
-    index = np.full(len(points), -1)
-    index[used] = np.arange(len(used))
-    faces = hull.simplices.astype(np.int64)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    faces[inward] = faces[inward][:, [0, 2, 1]]
-    return points[used], index[faces]
+    used, index = np.unique(faces, return_inverse=True)
+    return points[used], index.reshape(-1, 3)
 
 
 def _cone_points(a: Vector, b: Vector, radius_a: float, radius_b: float) -> Matrix:
@@ -270,7 +286,7 @@ def fit_hull(points: Matrix) -> dict[str, Any]:
     """Return the fields of a hull that approximates the convex hull of points (n, 3).
 
     A flat cloud gives a thin box. Of more than `HULL_POINTS` corners those are kept
-    that lie farthest outside the hull of the ones before them.
+    that lie farthest outside of the hull of the ones before them.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     centred = points - points.mean(axis=0)
@@ -279,22 +295,5 @@ def fit_hull(points: Matrix) -> dict[str, Any]:
         half = np.maximum((high - low) / 2, MIN_HALF_SIZE)
         centre = ((low + high) / 2).tolist()
         return {"shape": "box", "size": half.tolist(), "pos": centre}
-    corners = points[ConvexHull(points).vertices]
-    if len(corners) > HULL_POINTS:
-        corners = _farthest_first(corners)
+    corners, _ = convex_hull(points, most=HULL_POINTS)
     return {"shape": "hull", "spheres": [[*p, 0.0] for p in corners.tolist()]}
-
-
-def _farthest_first(corners: Matrix) -> Matrix:
-    """Return the `HULL_POINTS` corners that leave the least outside their hull."""
-    scaled = corners / np.ptp(corners, axis=0)
-    directions = np.concatenate([np.eye(3), -np.eye(3), _icosphere(0)])
-    chosen = np.unique(np.argmax(scaled @ directions.T, axis=0)).tolist()
-    hull = ConvexHull(corners[chosen], incremental=True)
-    while len(chosen) < HULL_POINTS:
-        planes = hull.equations
-        outside = (corners @ planes[:, :3].T + planes[:, 3]).max(axis=1)
-        farthest = int(np.argmax(outside))
-        chosen.append(farthest)
-        hull.add_points(corners[[farthest]])
-    return corners[chosen]

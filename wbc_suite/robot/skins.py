@@ -6,11 +6,9 @@ a folder of the user. Physics does not change.
 """
 
 import importlib.util
-import itertools
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -20,6 +18,7 @@ from wbc_suite import logs
 from wbc_suite.catalogue import Catalogue, user_cache_root
 from wbc_suite.errors import ConfigError, UnknownNameError, look_up
 from wbc_suite.robot.elements import Name
+from wbc_suite.robot.mesh_files import MeshIndex
 from wbc_suite.robot.shapes import Color, Posed, SkinMesh, Vector3
 from wbc_suite.tomlfile import FrozenModel, load_model
 
@@ -102,6 +101,7 @@ class SkinFinder:
             raise ConfigError(
                 f"skin: '{skin}' is neither '{MESHES}' nor a folder with meshes."
             )
+        self._index = None if self._folder is None else MeshIndex(self._folder)
         self._missing: dict[str, list[str]] = {}
         self._found = False
 
@@ -151,8 +151,8 @@ class SkinFinder:
 
     def _locate(self, table: SkinTable, file: str) -> Path | None:
         inside = Path(table.folder) / file
-        if self._folder is not None:
-            return self._in_folder(inside)
+        if self._index is not None:
+            return self._index.find(inside)
         first, *rest = inside.parts
         versioned = "/".join((f"{first}-*", *rest))  # the folder name-1a2b of a version
         for folder in PROVIDERS[table.provider][1]():
@@ -161,32 +161,9 @@ class SkinFinder:
                     return path
         return None
 
-    def _in_folder(self, file: Path) -> Path | None:
-        """Find the only file of the user's folder with the longest common path end."""
-        matches = self._by_name.get(file.name.casefold(), [])
-        longest = max((_common_end(path, file) for path in matches), default=0)
-        best = [path for path in matches if _common_end(path, file) == longest]
-        return best[0] if len(best) == 1 else None
-
-    @cached_property
-    def _by_name(self) -> dict[str, list[Path]]:
-        found: dict[str, list[Path]] = {}
-        assert self._folder is not None
-        for path in sorted(self._folder.rglob("*")):
-            if path.suffix.casefold() in (".obj", ".stl"):
-                found.setdefault(path.name.casefold(), []).append(path)
-        return found
-
 
 def read_skin(path: Path) -> SkinTable:
     """Read a table of meshes; raises ConfigError or UnknownNameError."""
     table = load_model(SkinTable, path)
     look_up("provider of meshes", table.provider, PROVIDERS)
     return table
-
-
-def _common_end(one: Path, other: Path) -> int:
-    """Return how many trailing parts of two paths are equal, ignoring case."""
-    pairs = zip(reversed(one.parts), reversed(other.parts), strict=False)
-    same = (a.casefold() == b.casefold() for a, b in pairs)
-    return sum(1 for _ in itertools.takewhile(bool, same))

@@ -26,7 +26,7 @@ class TriangleMesh:
     faces: Indices
 
     def moved(self, position: Vector, rotation: Matrix) -> "TriangleMesh":
-        """Return the mesh in another frame, given the mesh's pose in it."""
+        """Return it in another frame, given its position (3,) and rotation (3, 3)."""
         return TriangleMesh(self.vertices @ rotation.T + position, self.faces)
 
 

@@ -8,14 +8,14 @@ import pinocchio as pin
 
 from wbc_suite import logs
 from wbc_suite.errors import DescriptionError, did_you_mean, join_first
-from wbc_suite.robot.contact_pairs import exclude_by_sampling, exclude_overlapping
-from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.importing import (
+from wbc_suite.robot.adopt.contact_pairs import exclude_contacts
+from wbc_suite.robot.adopt.importing import (
     UNLIMITED_RANGE,
     LinkFields,
     NameTable,
     describe_import,
 )
+from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.robot.shapes import SkinMesh
@@ -95,7 +95,7 @@ def read_urdf(
             LOG.warning("%s: its root is fixed: %s", path, error)
     if skin:
         robot = robot.model_copy(update={"skins": importer.skins()})
-    return exclude_by_sampling(exclude_overlapping(robot, path), path)
+    return exclude_contacts(robot, path)
 
 
 class _Importer:

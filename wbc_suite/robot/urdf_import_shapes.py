@@ -1,8 +1,6 @@
 """Read the shapes, meshes and colours of a URDF file."""
 
 from collections.abc import Iterator
-from functools import cached_property
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +9,8 @@ import pinocchio as pin
 
 from wbc_suite import logs
 from wbc_suite.errors import DescriptionError, join_first
-from wbc_suite.robot.importing import NameTable
-from wbc_suite.robot.mesh_files import COLLADA, GLTF, READABLE, can_read, read_points
+from wbc_suite.robot.adopt.importing import NameTable
+from wbc_suite.robot.mesh_files import MeshIndex, can_read, read_points
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.robot.shapes import SkinMesh
@@ -23,8 +21,6 @@ from wbc_suite.typing import Vector
 LOG = logs.logger(__name__)
 
 MIN_SIZE = 2e-6  # smallest size of a shape in m; smaller ones are left out
-ENDING, MAX_FILES = 3, 20_000
-"""Parts of a path by which a mesh is found elsewhere, among so many files."""
 
 
 class MeshFolder:
@@ -32,10 +28,11 @@ class MeshFolder:
 
     def __init__(self, urdf: Path, root: Path | str) -> None:
         self._urdf, self._root = urdf, Path(root).resolve()
+        self._index = MeshIndex(self._root)
         self._shapes: dict[tuple[str | float, ...], dict[str, Any] | None] = {}
 
     def hull(self, filename: str, scale: Vector) -> dict[str, Any] | None:
-        """Return the fields of a mesh's hull; None if it is missing or unreadable."""
+        """Return the fields of a hull, scaled (3,); None without a readable mesh."""
         key = (filename, *scale.tolist())
         if key not in self._shapes:
             path = self.find(filename)
@@ -58,27 +55,8 @@ class MeshFolder:
             path = candidate.resolve()
             if path.is_relative_to(self._root) and path.is_file():
                 return path
-        return self._elsewhere(rest or filename)
-
-    def _elsewhere(self, filename: str) -> Path | None:
-        """Return the only file in the folder whose last parts are those of a name."""
-        parts = Path(filename).parts
-        for count in range(min(len(parts), ENDING), 0, -1):
-            same = self._files.get(parts[-count:], [])
-            if same:
-                return same[0] if len(same) == 1 else None
-        return None
-
-    @cached_property
-    def _files(self) -> dict[tuple[str, ...], list[Path]]:
-        """The meshes of the folder, by their last parts."""
-        found: dict[tuple[str, ...], list[Path]] = {}
-        for path in islice(self._root.rglob("*"), MAX_FILES):
-            mesh = path.suffix.lower() in (*READABLE, COLLADA, GLTF)
-            if mesh and path.resolve().is_relative_to(self._root):
-                for count in range(1, ENDING + 1):
-                    found.setdefault(path.parts[-count:], []).append(path)
-        return found
+        path = self._index.find(Path(rest or filename))
+        return path if path and path.resolve().is_relative_to(self._root) else None
 
     def report(self) -> None:
         """Log one line with the number of meshes, and a warning about absent ones."""
@@ -100,7 +78,7 @@ class MeshFolder:
             )
         if unread:
             LOG.warning(
-                "%s: left out %d meshes that are not STL or OBJ (to read them: "
+                "%s: left out %d meshes that are not STL, OBJ or GLB (to read them: "
                 "pip install 'wbc-suite[skins]'): %s.",
                 *(self._urdf, len(unread), join_first(unread)),
             )

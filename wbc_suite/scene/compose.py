@@ -9,8 +9,9 @@ from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.poses import pose_at, pose_fields, se3_of
 from wbc_suite.robot.shapes import Vector3
+from wbc_suite.scene.geom_bounds import box_corners, solid_geoms, support
 from wbc_suite.scene.objects.scene_object import TORSION, SceneObject
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Vector
 
 log = logs.logger(__name__)
 
@@ -76,30 +77,12 @@ def _lowest_point(robot: RobotDescription) -> float:
     if "ready" in robot.keyframes:
         mujoco.mj_resetDataKeyframe(m, data, m.key("ready").id)
     mujoco.mj_kinematics(m, data)
-    solid = np.flatnonzero(m.geom_contype | m.geom_conaffinity)
-    return min((_bottom(m, data, int(geom)) for geom in solid), default=0.0)
-
-
-def _bottom(m: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
-    """Return the height of the lowest point of a geom, m."""
-    up = data.geom_xmat[geom].reshape(3, 3)[2]  # the vertical in the geom's axes
-    size, shapes = m.geom_size[geom], mujoco.mjtGeom
-    match m.geom_type[geom]:
-        case shapes.mjGEOM_MESH:
-            mesh = m.geom_dataid[geom]
-            first, count = m.mesh_vertadr[mesh], m.mesh_vertnum[mesh]
-            depth = -np.min(m.mesh_vert[first : first + count] @ up)
-        case shapes.mjGEOM_SPHERE:
-            depth = size[0]
-        case shapes.mjGEOM_CAPSULE:
-            depth = size[0] + size[1] * abs(up[2])
-        case shapes.mjGEOM_CYLINDER:
-            depth = size[0] * np.hypot(up[0], up[1]) + size[1] * abs(up[2])
-        case shapes.mjGEOM_ELLIPSOID:
-            depth = np.linalg.norm(size * up)
-        case _:
-            depth = size @ abs(up)
-    return float(data.geom_xpos[geom, 2] - depth)
+    bottoms = []
+    for geom in solid_geoms(m).tolist():
+        down = -data.geom_xmat[geom].reshape(3, 3)[2]  # the vertical in its axes
+        depth = support(m, geom, down[None])[0]
+        bottoms.append(float(data.geom_xpos[geom, 2] - depth))
+    return min(bottoms, default=0.0)
 
 
 def attach_robot(
@@ -191,28 +174,14 @@ def aim_robot_view(state: RobotState) -> None:
 def _extent(state: RobotState, place: pin.SE3) -> tuple[Vector, Vector]:
     """Return the corners of a box around the robot in another frame, m."""
     model, data = state.model, state.data
-    solid = (model.geom_contype | model.geom_conaffinity) > 0
-    own = [
-        i
-        for i, body in enumerate(model.geom_bodyid.tolist())
-        if model.body(body).name.startswith(state.prefix)
-    ]
-    own = [i for i in own if solid[i]] or own
-    if own:
-        low, high = _geom_bounds(model, data, np.array(own), place)
+    prefix, bodies = state.prefix, model.geom_bodyid.tolist()
+    named = [k for k, b in enumerate(bodies) if model.body(b).name.startswith(prefix)]
+    own = np.intersect1d(named, solid_geoms(model)) if named else np.empty(0, int)
+    geoms = own if len(own) else np.array(named, int)
+    if len(geoms):
+        at = place.translation, place.rotation
+        low, high = box_corners(model, data, geoms, *at)
     else:
-        bodies = [state.model.body(state.prefix + x.name).id for x in state.robot.links]
-        low = high = (data.xpos[bodies] - place.translation) @ place.rotation
+        links = [model.body(prefix + link.name).id for link in state.robot.links]
+        low = high = (data.xpos[links] - place.translation) @ place.rotation
     return low.min(axis=0), high.max(axis=0)
-
-
-def _geom_bounds(
-    model: mujoco.MjModel, data: mujoco.MjData, geoms: Indices, place: pin.SE3
-) -> tuple[Matrix, Matrix]:
-    """Return the corners of a box around each geom in a frame, m, shape (n, 3)."""
-    turns = place.rotation.T @ data.geom_xmat[geoms].reshape(-1, 3, 3)
-    middle, half = np.split(model.geom_aabb[geoms], 2, axis=1)
-    middles = (data.geom_xpos[geoms] - place.translation) @ place.rotation
-    middles += np.einsum("gij,gj->gi", turns, middle)
-    reach = np.einsum("gij,gj->gi", abs(turns), half)
-    return middles - reach, middles + reach

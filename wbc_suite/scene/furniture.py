@@ -12,7 +12,7 @@ from wbc_suite.scene.objects.vessels import open_bin
 from wbc_suite.tomlfile import FrozenModel
 
 LEG: Color = (0.32, 0.33, 0.35, 1.0)
-LEG_RADIUS, INSET = 0.012, 0.03
+LEG_RADIUS, INSET = 0.012, 0.03  # m, of legs, and from the edges of the bin
 GHOST = 0.3  # opacity of visual goals
 
 

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from pinocchio.utils import rotate
 
+from wbc_suite.scene.geom_bounds import box_corners, solid_geoms
 from wbc_suite.typing import Indices, Matrix, Vector
 
 LEVEL = math.cos(math.radians(1.0))
@@ -86,10 +88,10 @@ def suits(top: Surface, height: float) -> bool:
 
 
 def still_geoms(m: mujoco.MjModel) -> Indices:
-    """Return the geoms, planes excepted, that collide and cannot move."""
-    solid = (m.geom_contype | m.geom_conaffinity) > 0
-    still = m.body_weldid[m.geom_bodyid] == 0
-    return np.flatnonzero(solid & still & (m.geom_type != mujoco.mjtGeom.mjGEOM_PLANE))
+    """Return the geoms but planes that collide and cannot move, shape (n,)."""
+    solid, planes = solid_geoms(m), mujoco.mjtGeom.mjGEOM_PLANE
+    still = m.body_weldid[m.geom_bodyid[solid]] == 0
+    return solid[still & (m.geom_type[solid] != planes)]
 
 
 def free_side(m: mujoco.MjModel, data: mujoco.MjData, top: Surface) -> int | None:
@@ -100,15 +102,10 @@ def free_side(m: mujoco.MjModel, data: mujoco.MjData, top: Surface) -> int | Non
 
 def _has_room(m: mujoco.MjModel, data: mujoco.MjData, top: Surface, k: int) -> bool:
     heading, depth, _ = top.from_side(k)
-    geoms, (c, s) = still_geoms(m), (math.cos(heading), math.sin(heading))
-    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])  # into the heading's
-    R = turn @ data.geom_xmat[geoms].reshape(-1, 3, 3)
-    box, half = np.split(m.geom_aabb[geoms], 2, axis=1)
-    middle = (data.geom_xpos[geoms] - top.middle) @ turn.T
-    middle += np.einsum("gij,gj->gi", R, box)
-    reach = np.einsum("gij,gj->gi", np.abs(R), half)
+    R = rotate("z", heading)
+    corners = box_corners(m, data, still_geoms(m), top.middle, R)
     edge, floor = -depth / 2, -float(top.middle[2])
     low = np.array([edge - DEPTH, -HALF_WIDTH, floor + FROM])
     high = np.array([edge - GAP, HALF_WIDTH, floor + TO])
-    inside = (middle + reach > low) & (middle - reach < high)
+    inside = (corners[1] > low) & (corners[0] < high)
     return not inside.all(axis=1).any()

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.control import RobotState
-from wbc_suite.sensing.change import Change
-from wbc_suite.sensing.picture_channels import Picture, PictureChannel
+from wbc_suite.sensing.change import Change, Channel, Values
 from wbc_suite.sensing.projection import Projection, camera_id
 from wbc_suite.sensing.renderer import Renderer, RenderPreset, make_renderer
 from wbc_suite.sensing.segmentation import Labels, SegmentationLevel
@@ -69,7 +68,7 @@ class Cameras:
             self._drawn |= self._spaces(request)
         self.observed = tuple(self._drawn)
         self.space: dict[str, gymnasium.Space[Any]] = dict(self._drawn)
-        self._channels: dict[str, PictureChannel] = {}
+        self._channels: dict[str, Channel] = {}
         self._rng = np.random.default_rng(0)
 
     @property
@@ -82,23 +81,23 @@ class Cameras:
         """Names of all cameras of the scene."""
         return tuple(self._model.camera(i).name for i in range(self._model.ncam))
 
-    def observation(self) -> dict[str, Picture]:
+    def observation(self) -> dict[str, Values]:
         """Return the observed pictures, by key, with the changes applied."""
-        pictures: dict[str, Picture] = {}
+        pictures: dict[str, Values] = {}
         for request in self._requests:
             pictures |= self._draw(request)
         time = float(self._data.time)
         for key, channel in self._channels.items():
             if key in pictures:
-                pictures[key] = channel.show(pictures[key], time, self._rng)
+                pictures[key] = channel.look(pictures[key], time, self._rng)
         return pictures
 
-    def _draw(self, request: CameraRequest) -> dict[str, Picture]:
+    def _draw(self, request: CameraRequest) -> dict[str, Values]:
         """Return the active pictures of a camera."""
         image, depth = f"{request.name}_image", f"{request.name}_depth"
         keys = {request.segmentation_key(x): x for x in request.segmentations}
         levels = {key: level for key, level in keys.items() if key in self.space}
-        pictures: dict[str, Picture] = {}
+        pictures: dict[str, Values] = {}
         if not {image, depth, *levels} & self.space.keys():
             return pictures
         renderer = self._aim(request.name, request.width, request.height)
@@ -118,19 +117,18 @@ class Cameras:
         Raises:
             ConfigError: If the crop is larger than the picture; then nothing changes.
         """
-        channel = None if change is None else PictureChannel(change, self._drawn[key])
-        old = self._channels.pop(key, None)
-        space, active = dict(self.space), change is None or change.active
-        space[key] = self._drawn[key] if channel is None else channel.space
-        if channel is not None:
+        space = {**self.space, key: self._drawn[key]}
+        if change is None:
+            self._channels.pop(key, None)
+        else:
+            channel = Channel(change, self._drawn[key], self._model.opt.timestep)
+            old = self._channels.get(key)
             if old is not None and old.space == channel.space:
-                kept, channel.state = channel.state, old.state
-                if old.change.filter is not channel.change.filter:
-                    channel.state.filter = kept.filter
-            self._channels[key] = channel
+                channel.continue_from(old)
+            self._channels[key], space[key] = channel, channel.space
+            if not change.active:
+                del space[key]
         self.space = {k: space[k] for k in self.observed if k in space}
-        if not active:
-            del self.space[key]
 
     def start(self, rng: np.random.Generator) -> None:
         """Start an episode; changes draw from a generator that `rng` spawns."""
@@ -151,7 +149,7 @@ class Cameras:
             if key in self._channels:
                 self._channels[key].state = saved
 
-    def black(self) -> dict[str, Picture]:
+    def black(self) -> dict[str, Values]:
         """Return black pictures in place of the observed ones, by key."""
         return {k: np.zeros(s.shape or (), s.dtype) for k, s in self.space.items()}
 

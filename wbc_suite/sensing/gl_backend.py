@@ -36,7 +36,7 @@ _MODULES = ("egl", "osmesa", "cgl", "glfw")
 """Modules of MuJoCo that hold a class of contexts."""
 
 _SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "swrast")
-_PROBE_SECONDS = 60.0
+_PROBE_SECONDS = 60.0  # s until a backend counts as one that cannot draw
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -4,26 +4,21 @@ Unchanged observations are read once a control period, changed ones after every 
 step. Pictures are drawn when they are observed, and changed by `Cameras`.
 """
 
-import copy
-import math
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
+import gymnasium
 import mujoco
 import numpy as np
 
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.sensing.cameras import Cameras
-from wbc_suite.sensing.change import Change
+from wbc_suite.sensing.change import Change, Channel
 from wbc_suite.sensing.observation_buffer import ObservationBuffer
 from wbc_suite.sensing.reading import Reading
-from wbc_suite.typing import Vector
 
 Maker: TypeAlias = Callable[[mujoco.MjModel, mujoco.MjData], Reading]
-
-ROUNDING = 1e-6  # samples
 
 
 class Observables:
@@ -47,7 +42,7 @@ class Observables:
         self._groups = {name: dict(group) for name, group in groups.items()}
         self._added: dict[str, tuple[str, Maker]] = {}
         self.changes: dict[str, Change] = {}
-        self._channels: dict[str, _Channel] = {}
+        self._channels: dict[str, Channel] = {}
         self._rng = np.random.default_rng(0)
         self.buffer = ObservationBuffer(data, self._groups)
 
@@ -105,9 +100,9 @@ class Observables:
         """Start an episode; noise is drawn from a generator that `rng` seeds."""
         if self.changes:
             self._rng = np.random.default_rng(rng.integers(2**63))
-        self.buffer.update()
         for channel in self._channels.values():
-            channel.start(self.buffer.values, self._rng)
+            channel.start()
+        self.sample()
         if self._cameras is not None:
             self._cameras.start(self._rng)
         self._show()
@@ -120,8 +115,9 @@ class Observables:
     def sample(self) -> None:
         """Take the samples of changed observations after one physics step."""
         self.buffer.update()
-        for channel in self._channels.values():
-            channel.sample(self.buffer.values, self._rng)
+        time = float(self._data.time)
+        for key, channel in self._channels.items():
+            channel.look(self.buffer.values[self.buffer.places[key]], time, self._rng)
 
     def update(self) -> None:
         """Read everything into `buffer.values`, with the changes applied."""
@@ -157,8 +153,8 @@ class Observables:
         self.update()
 
     def _show(self) -> None:
-        for channel in self._channels.values():
-            channel.show(self.buffer.values)
+        for key, channel in self._channels.items():
+            self.buffer.values[self.buffer.places[key]] = channel.state.shown
 
     def _rebuild(self) -> None:
         """Make a buffer of the active observations."""
@@ -180,87 +176,11 @@ class Observables:
         change, old = self.changes.get(key), self._channels.pop(key, None)
         if change is None or not change.active:
             return
-        place, bound = self.buffer.places[key], self.buffer.bounds[key]
-        channel = _Channel(change, place, bound, self._model.opt.timestep)
+        space = cast("gymnasium.spaces.Box", self.buffer.space[key])
+        channel = Channel(change, space, self._model.opt.timestep)
         if old is None:
-            channel.start(self.buffer.values, self._rng)
+            values = self.buffer.values[self.buffer.places[key]]
+            channel.look(values, float(self._data.time), self._rng)
         else:
             channel.continue_from(old)
         self._channels[key] = channel
-
-
-class _Channel:
-    """Sampling, noise, filter and delay of one observation."""
-
-    def __init__(
-        self, change: Change, place: slice, bound: float, timestep: float
-    ) -> None:
-        self._change, self._place, self._bound = change, place, bound
-        self._timestep, self._step = timestep, 0
-        rate = change.sampling_rate
-        self._samples_per_step = 1.0 if rate is None else min(1.0, rate * timestep)
-        self._filter = copy.deepcopy(change.filter)
-        self._shown: Vector = np.zeros(place.stop - place.start)
-        self._coming: deque[tuple[int, Vector]] = deque()
-
-    @property
-    def state(self) -> tuple[Any, ...]:
-        """Step count, filter, shown values and samples still delayed."""
-        return self._step, self._filter, self._shown, self._coming
-
-    @state.setter
-    def state(self, saved: tuple[Any, ...]) -> None:
-        self._step, self._filter, self._shown, self._coming = saved
-
-    def continue_from(self, old: "_Channel") -> None:
-        """Take over the samples of the channel before a change, and a kept filter."""
-        own = self._filter
-        self.state = old.state
-        if self._change.filter is not old._change.filter:
-            self._filter = own
-
-    def start(self, values: Vector, rng: np.random.Generator) -> None:
-        """Take a first sample without delay."""
-        self._step, self._coming = 0, deque()
-        reset = getattr(self._filter, "reset", None)
-        if reset is not None:
-            reset()
-        self._shown = values[self._place].copy()
-        if self._change.enabled:
-            self._shown = self._taken(values, rng)
-
-    def sample(self, values: Vector, rng: np.random.Generator) -> None:
-        """Take a sample if one is due, and release those whose delay is over."""
-        self._step += 1
-        if self._change.enabled and self._is_due() and self._kept(rng):
-            delay = self._change.delay
-            wait = delay(rng) if callable(delay) else delay
-            due = self._step + round(wait / self._timestep)
-            self._coming.append((due, self._taken(values, rng)))
-        while any(due <= self._step for due, _ in self._coming):
-            self._shown = self._coming.popleft()[1]
-
-    def _kept(self, rng: np.random.Generator) -> bool:
-        """Return whether a sample is not lost."""
-        dropout = self._change.dropout
-        return not dropout or rng.uniform() >= dropout
-
-    def _is_due(self) -> bool:
-        """Return whether a sample falls into the last step; on average at the rate."""
-        before, after = (
-            math.floor(step * self._samples_per_step + ROUNDING)
-            for step in (self._step - 1, self._step)
-        )
-        return after > before
-
-    def show(self, values: Vector) -> None:
-        """Write the observed values over the true ones."""
-        values[self._place] = self._shown
-
-    def _taken(self, values: Vector, rng: np.random.Generator) -> Vector:
-        sample = values[self._place].copy()
-        if self._change.noise is not None:
-            sample = self._change.noise(sample, rng)
-        if self._filter is not None:
-            sample = self._filter(sample)
-        return np.clip(np.asarray(sample, np.float64), -self._bound, self._bound)

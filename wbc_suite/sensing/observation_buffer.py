@@ -63,7 +63,7 @@ class ObservationBuffer:
         np.minimum(self.values, self._high, out=self.values)
 
     def observation(self) -> dict[str, Vector]:
-        """Return copies of the last readings by key."""
+        """Return copies of the last readings by key, shape (size of the key,)."""
         copies = self.values.copy(), self.values.copy()
         return {key: copies[which][place] for key, which, place in self._cuts}
 

@@ -26,7 +26,7 @@ PIECES = 20
 HIDDEN_GROUP = 5
 """A group of geoms that MuJoCo does not draw by default."""
 
-MAX_GEOMS = 10_000
+MAX_GEOMS = 10_000  # of a scene that is drawn; MuJoCo leaves out further ones
 
 SURFACE_FLAGS = [
     int(mujoco.mjtRndFlag.mjRND_SEGMENT),
@@ -231,7 +231,7 @@ class Renderer:
 
 
 def coarse_floors(model: mujoco.MjModel) -> dict[int, Array]:
-    """Return the size of the finite plane drawn for each infinite one, by its geom.
+    """Return the size (3,) of the finite plane drawn for each infinite one, by geom.
 
     The plane reaches beyond the horizon and its middle is a corner of the texture. Its
     size has half sides and half a piece's, m, as in MJCF. MuJoCo spans a finite plane
@@ -252,7 +252,7 @@ def coarse_floors(model: mujoco.MjModel) -> dict[int, Array]:
 def outside(
     model: mujoco.MjModel, data: mujoco.MjData, camera: int, aspect: float
 ) -> Indices:
-    """Return geoms outside of a camera's picture, by their bounding spheres.
+    """Return geoms (n,) outside of a camera's picture, by their bounding spheres.
 
     Cameras with optics besides a field of view give none. `aspect` is the width of the
     picture over its height.

@@ -14,11 +14,11 @@ from wbc_suite.control.composite.whole_body_dynamics_config import (
 from wbc_suite.envs.hold_check import hold_faults
 from wbc_suite.errors import WbcError
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.adopt.grippers import Gripper, infer_grippers
+from wbc_suite.robot.adopt.importing import with_soles
+from wbc_suite.robot.adopt.missing_data import with_rotor
+from wbc_suite.robot.adopt.soles import guess_sole
 from wbc_suite.robot.elements import Frame, Root
-from wbc_suite.robot.gripper_inference import Gripper, infer_grippers
-from wbc_suite.robot.importing import with_soles
-from wbc_suite.robot.missing_data import with_rotor
-from wbc_suite.robot.sole_inference import guess_sole
 from wbc_suite.robot.toml_export import toml_text
 from wbc_suite.tomlfile import parse_model
 from wbc_suite.viewers.page_server import PageServer

@@ -21,9 +21,9 @@ from wbc_suite.control.dynamics.state_source import StateSourceConfig
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.locomotion import GAITS, GaitConfig, TrotConfig
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.adopt.soles import ball_radius, guess_sole
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.shapes import Interval
-from wbc_suite.robot.sole_inference import ball_radius, guess_sole
 from wbc_suite.tomlfile import FrozenModel, located, parse_model
 
 NOISY_CUTOFF = 25.0

@@ -15,8 +15,8 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.qp import Sole
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.adopt.soles import ball_radius, guess_sole
 from wbc_suite.robot.elements import Name
-from wbc_suite.robot.sole_inference import ball_radius, guess_sole
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 

@@ -10,7 +10,7 @@ PANEL: Color = (0.42, 0.27, 0.16, 1.0)
 INLAY: Color = (0.50, 0.33, 0.20, 1.0)
 BRASS: Color = (0.83, 0.62, 0.27, 1.0)
 
-HALF_WIDTH, HALF_HEIGHT, HALF_THICK = 0.145, 0.165, 0.012
+HALF_WIDTH, HALF_HEIGHT, HALF_THICK = 0.145, 0.165, 0.012  # of the panel, m
 POST = 0.018  # radius of the two posts, m
 GAP = 0.006  # between panel and posts, m
 HANDLE_OUT = 0.058

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.robot.poses import pose_at
-from wbc_suite.robot.shapes import Vector3
+from wbc_suite.scene.geom_bounds import solid_geoms, support
 from wbc_suite.scene.objects.scene_object import STANDING, Quat, SceneObject
 from wbc_suite.typing import Matrix, Vector
 
@@ -42,11 +42,9 @@ class ObjectState:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, name: str) -> None:
         self.model, self.data, self.name = model, data, name
         self.body: int = model.body(name).id
-        solid = (model.geom_contype | model.geom_conaffinity) > 0
-        under = _bodies_under(model, self.body)
-        self.geoms = frozenset(
-            np.flatnonzero(solid & under[model.geom_bodyid]).tolist()
-        )
+        solid, under = solid_geoms(model), _bodies_under(model, self.body)
+        own = solid[under[model.geom_bodyid[solid]]]
+        self.geoms = frozenset(own.tolist())
         self.position: Vector = data.xpos[self.body]
         self.rotation: Matrix = data.xmat[self.body].reshape(3, 3)
         joint, count = model.body_jntadr[self.body], model.body_jntnum[self.body]
@@ -87,25 +85,6 @@ class ObjectState:
         q[self._q + 3 : self._q + 7] = quat
         v[self._v : self._v + 6] = 0.0
 
-    def resize_box(self, half_size: Vector3, *, density: float) -> None:
-        """Write another size, and what follows from it, into a model's free box."""
-        model, body, v = self.model, self.body, self._v
-        (geom,) = self.geoms
-        size = np.asarray(half_size)
-        mass = density * 8.0 * float(np.prod(size))
-        squares = size**2
-        inertia = mass / 3.0 * (squares.sum() - squares)
-        model.geom_size[geom] = model.geom_aabb[geom, 3:] = size
-        model.geom_rbound[geom] = np.linalg.norm(size)
-        model.bvh_aabb[model.body_bvhadr[body], 3:] = size
-        model.body_mass[body] = model.body_subtreemass[body] = mass
-        model.body_inertia[body] = inertia
-        model.body_invweight0[body] = 1.0 / mass, np.mean(1.0 / inertia)
-        model.dof_invweight0[v : v + 3] = 1.0 / mass
-        model.dof_invweight0[v + 3 : v + 6] = np.mean(1.0 / inertia)
-        # MuJoCo takes the mass matrix of bodies without offset from here.
-        model.dof_M0[v : v + 3], model.dof_M0[v + 3 : v + 6] = mass, inertia
-
     def reshape(self, changed: SceneObject) -> None:
         """Write the object with other sizes of its parts into the compiled model.
 
@@ -137,8 +116,13 @@ class ObjectState:
         angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
         flat = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(DIRECTIONS)])
         ways = np.vstack([flat, (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]) @ R
-        own = [g for g in self.geoms if self.model.geom_bodyid[g] == self.body]
-        reach = np.max([_support(self.model, g, ways) for g in own], axis=0)
+        model = self.model
+        reach = np.full(len(ways), -np.inf)
+        for geom in self.geoms:
+            if model.geom_bodyid[geom] == self.body:
+                place = pose_at(model.geom_pos[geom], model.geom_quat[geom])
+                own = support(model, geom, ways @ place.rotation)
+                reach = np.maximum(reach, ways @ place.translation + own)
         return Extent(
             radius=float(reach[:-2].max()),
             bottom=float(reach[-2]),
@@ -164,29 +148,3 @@ def _bodies_under(model: mujoco.MjModel, body: int) -> np.ndarray:
     for child in range(body + 1, model.nbody):
         marked[child] |= marked[model.body_parentid[child]]
     return marked
-
-
-def _support(model: mujoco.MjModel, geom: int, ways: Matrix) -> Vector:
-    """Return the support function of a geom along unit vectors of its body's frame.
-
-    h(u) is the largest u . p over the points p of the geom.
-    """
-    place = pose_at(model.geom_pos[geom], model.geom_quat[geom])
-    u = ways @ place.rotation
-    kinds, size = mujoco.mjtGeom, model.geom_size[geom]
-    match model.geom_type[geom]:
-        case kinds.mjGEOM_SPHERE:
-            reach = np.full(len(u), size[0])
-        case kinds.mjGEOM_CAPSULE:
-            reach = size[0] + size[1] * np.abs(u[:, 2])
-        case kinds.mjGEOM_CYLINDER:
-            reach = size[0] * np.hypot(u[:, 0], u[:, 1]) + size[1] * np.abs(u[:, 2])
-        case kinds.mjGEOM_ELLIPSOID:
-            reach = np.linalg.norm(u * size, axis=1)
-        case kinds.mjGEOM_MESH:
-            mesh = model.geom_dataid[geom]
-            first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-            reach = (u @ model.mesh_vert[first : first + count].T).max(axis=1)
-        case _:
-            reach = np.abs(u) @ size
-    return ways @ place.translation + reach

@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.robot.adopt.posed_robot import PosedRobot
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame
 from wbc_suite.typing import Vector
@@ -27,34 +28,24 @@ def standing_legs(robot: RobotDescription) -> dict[str, float]:
     posture `ready`, in which other joints stay. A leg without such a posture has no
     entry.
     """
-    model, data, q = at_ready(robot)
+    posed = PosedRobot(robot)
     found: dict[str, float] = {}
     for frame in robot.frames:
         if frame.role == "foot":
-            found |= _bent_leg(robot, model, data, q, frame)
+            found |= _bent_leg(posed, frame)
     return found
 
 
 def feet_are_level(robot: RobotDescription) -> bool:
     """Whether all feet have nearly the same height in the posture `ready`."""
-    model, data, _ = at_ready(robot)
+    posed = PosedRobot(robot)
     feet = [frame.name for frame in robot.frames if frame.role == "foot"]
-    heights = [data.oMf[model.getFrameId(name)].translation[2] for name in feet]
+    heights = [posed.pose(name).translation[2] for name in feet]
     return not feet or float(np.ptp(heights)) < LEVEL
 
 
-def at_ready(robot: RobotDescription) -> tuple[pin.Model, pin.Data, Vector]:
-    """Return model, data with the poses of frames, and positions at `ready`."""
-    model = robot.to_pinocchio()
-    data, q = model.createData(), pin.neutral(model)
-    for name, value in robot.keyframe("ready").items():
-        q[model.joints[model.getJointId(name)].idx_q] = value
-    pin.framesForwardKinematics(model, data, q)
-    return model, data, q
-
-
 def wheel_axis(robot: RobotDescription, frame: str) -> Vector | None:
-    """Return the axis of a foot's link that turns without limits through its frame."""
+    """Return the axis (3,) of a foot's link that turns without limits at its frame."""
     joint = robot.link(robot.link_of(frame)).joint
     if joint is None or joint.range is not None:
         return None
@@ -63,17 +54,11 @@ def wheel_axis(robot: RobotDescription, frame: str) -> Vector | None:
     return axis if away < AT_FRAME else None
 
 
-def _bent_leg(
-    robot: RobotDescription,
-    model: pin.Model,
-    data: pin.Data,
-    q: Vector,
-    frame: Frame,
-) -> dict[str, float]:
-    foot = model.getFrameId(frame.name)
-    pin.framesForwardKinematics(model, data, q)
+def _bent_leg(posed: PosedRobot, frame: Frame) -> dict[str, float]:
+    robot, model, data = posed.robot, posed.model, posed.data
+    start, foot = posed.q.copy(), model.getFrameId(frame.name)
     chain = model.supports[model.frames[foot].parentJoint].tolist()
-    along = {joint: _along_y(robot, model, data, joint) for joint in chain}
+    along = {joint: _along_y(posed, joint) for joint in chain}
     if wheel_axis(robot, frame.name) is not None:
         chain = chain[:-1]
     hinges = [joint for joint in chain if abs(along[joint]) > MIN_COSINE]
@@ -90,30 +75,30 @@ def _bent_leg(
 
     def residuals(angles: Vector) -> Vector:
         """Return the errors of the foot's x and z, m, and of its tilt times length."""
-        moved = q.copy()
-        moved[places] = angles
-        pin.framesForwardKinematics(model, data, moved)
+        posed.q[places] = angles
+        posed.update()
         off = data.oMf[foot].translation - data.oMi[hinges[0]].translation
         tilt = pin.log3(level.T @ data.oMf[foot].rotation)[1]
         tilt = tilt if len(hinges) > 2 else 0.0  # a point foot has no sole
         return np.array([off[0], off[2] + left * length, length * tilt])
 
     signs = np.sign([along[joint] for joint in hinges])
-    start: Vector = np.clip(signs * np.asarray(angles), low, high)
+    first: Vector = np.clip(signs * np.asarray(angles), low, high)
     from scipy.optimize import least_squares  # takes 0.3 s to import
 
-    best = least_squares(residuals, start, bounds=(low - 1e-9, high + 1e-9))
+    best = least_squares(residuals, first, bounds=(low - 1e-9, high + 1e-9))
+    posed.q[:] = start
+    posed.update()
     if not np.linalg.norm(best.fun) < TOLERANCE:
         return {}
     names = [model.names[joint] for joint in hinges]
     return dict(zip(names, best.x.round(4).clip(low, high).tolist(), strict=True))
 
 
-def _along_y(
-    robot: RobotDescription, model: pin.Model, data: pin.Data, joint: int
-) -> float:
+def _along_y(posed: PosedRobot, joint: int) -> float:
     """Return the cosine between a hinge's axis and y; 0 for other joints."""
-    name = model.names[joint]
+    robot, name = posed.robot, posed.model.names[joint]
     if name not in robot.keyframes["ready"] or robot.joint(name).type != "hinge":
         return 0.0  # a root joint, a follower or a slide
-    return float(data.oMi[joint].rotation[1] @ np.asarray(robot.joint(name).axis))
+    axis = np.asarray(robot.joint(name).axis)
+    return float(posed.data.oMi[joint].rotation[1] @ axis)

@@ -6,11 +6,12 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.robot.adopt.posed_robot import PosedRobot
+from wbc_suite.robot.adopt.standing_posture import AT_FRAME, wheel_axis
 from wbc_suite.robot.collision_capsules import collision_spheres
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame, rigid_bodies
 from wbc_suite.robot.poses import pose_fields, poses_in_rigid_bodies, se3_of
-from wbc_suite.robot.standing_posture import AT_FRAME, at_ready, wheel_axis
 from wbc_suite.typing import Matrix
 
 FLAT = 0.004
@@ -73,12 +74,12 @@ def level_soles(
     feet = [frame for frame in robot.frames if frame.role == "foot"]
     if len(feet) > BIPED:
         return robot
-    model, data, _ = at_ready(robot)
-    root = data.oMf[model.getFrameId(robot.links[0].name)].rotation
+    posed = PosedRobot(robot)
+    root = posed.pose(robot.links[0].name).rotation
     to_world = pin.Quaternion(*robot.root.quat).matrix() @ root.T
     frames = {frame.name: frame for frame in robot.frames}
     for frame in feet:
-        rotation = to_world @ data.oMf[model.getFrameId(frame.name)].rotation
+        rotation = to_world @ posed.pose(frame.name).rotation
         if rotation[2, 2] > UPRIGHT_COSINE and rotation[0, 0] > AHEAD_COSINE:
             continue
         fields = pose_fields(se3_of(frame) * pin.SE3(rotation.T, np.zeros(3)))

@@ -8,8 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from wbc_suite.robot.elements import Frame, Link, rigid_bodies
-from wbc_suite.robot.name_words import (
+from wbc_suite.robot.adopt.name_words import (
     END_WORDS,
     FINGERS,
     KIND_OF,
@@ -18,6 +17,7 @@ from wbc_suite.robot.name_words import (
     words_in,
     words_of,
 )
+from wbc_suite.robot.elements import Frame, Link, rigid_bodies
 from wbc_suite.robot.shape_geometry import farthest_point
 
 END_OF = {

@@ -6,8 +6,8 @@ import numpy as np
 
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
 from wbc_suite.robot.poses import se3_of
-from wbc_suite.robot.shape_geometry import shape_bounds
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.robot.shape_geometry import bounds_of, shape_bounds
+from wbc_suite.typing import Matrix
 
 DENSITY = 1000.0  # kg/m^3; what MuJoCo assumes
 GRAVITY = 9.81  # m/s^2
@@ -43,9 +43,7 @@ def ellipsoid(link: Link, mass: float | None = None) -> Link:
 
     Without a mass in kg it has that of its volume. With one it keeps its centre.
     """
-    bounds = np.array([shape_bounds(shape) for shape in link.collision or link.visual])
-    low: Vector = bounds[:, 0].min(axis=0)
-    high: Vector = bounds[:, 1].max(axis=0)
+    low, high = bounds_of(link.collision or link.visual)
     com = tuple(((low + high) / 2.0).tolist()) if mass is None else link.com
     mass = mass or DENSITY * np.pi / 6.0 * float(np.prod(high - low))
     squares = ((high - low) / 2.0) ** 2
@@ -62,8 +60,8 @@ def gyration_fault(link: Link) -> str | None:
     shapes = (*link.collision, *link.visual)
     if not shapes or link.mass == 0.0:
         return None
-    bounds = np.array([shape_bounds(shape) for shape in shapes])
-    size = float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
+    low, high = bounds_of(shapes)
+    size = float(np.linalg.norm(high - low))
     radius = float(np.sqrt(max(0.0, sum(link.inertia[:3])) / 2.0 / link.mass))
     if GYRATION[0] * size <= radius <= GYRATION[1] * size:
         return None

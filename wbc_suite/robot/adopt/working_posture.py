@@ -3,11 +3,10 @@
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.robot.contact_pairs import contacts
+from wbc_suite.robot.adopt.posed_robot import PosedRobot
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -69,19 +68,10 @@ class _Search:
     """Postures of one robot; `q` is the present one."""
 
     def __init__(self, robot: RobotDescription) -> None:
-        self._robot, self._model = robot, robot.to_pinocchio()
-        self._data = self._model.createData()
-        self.q = pin.neutral(self._model)
-        for name, value in robot.keyframe("ready").items():
-            self.q[self._model.joints[self._model.getJointId(name)].idx_q] = value
-        self._compiled = robot.to_mjspec().compile()
-        self._physics = mujoco.MjData(self._compiled)
-        names = [robot.links[0].name, *(x.name for x in robot.links if x.joint)]
-        self._root = self._model.getFrameId(names[0])
-        self._addresses = {
-            joint.name: self._compiled.joint(joint.name).qposadr[0]
-            for joint in robot.joints
-        }
+        self._robot, self._posed = robot, PosedRobot(robot)
+        self._model, self._data = self._posed.model, self._posed.data
+        self.q = self._posed.q
+        self._root = self._model.getFrameId(robot.links[0].name)
         self._efforts = {joint.name: joint.effort for joint in robot.joints}
         self._touching = self._contacts(self.q)
 
@@ -191,9 +181,5 @@ class _Search:
         pose = self._data.oMi[self._model.getJointId(name)]
         return pose.rotation @ np.asarray(self._robot.joint(name).axis)
 
-    def _contacts(self, q: Vector) -> set[tuple[int, int]]:
-        m, data = self._compiled, self._physics
-        for name, address in self._addresses.items():
-            joint = self._model.joints[self._model.getJointId(name)]
-            data.qpos[address] = q[joint.idx_q]
-        return contacts(m, data)
+    def _contacts(self, q: Vector) -> set[frozenset[str]]:
+        return self._posed.contacts(q[self._posed.places], np.inf)[0]

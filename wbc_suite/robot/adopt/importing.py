@@ -7,17 +7,14 @@ from typing import Any, TypeAlias
 
 from wbc_suite import logs
 from wbc_suite.errors import DescriptionError, join_first, shortened
-from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.elements import Frame, Link, rigid_bodies
-from wbc_suite.robot.group_inference import (
+from wbc_suite.robot.adopt.limbs import (
     Limb,
     infer_frames,
     infer_limbs,
     infer_ready,
     infer_role,
 )
-from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
-from wbc_suite.robot.missing_data import (
+from wbc_suite.robot.adopt.missing_data import (
     ellipsoid,
     estimate_armatures,
     estimate_lifts,
@@ -25,10 +22,13 @@ from wbc_suite.robot.missing_data import (
     estimate_motors,
     gyration_fault,
 )
-from wbc_suite.robot.sole_inference import level_soles
-from wbc_suite.robot.standing_posture import feet_are_level, standing_legs
+from wbc_suite.robot.adopt.soles import level_soles
+from wbc_suite.robot.adopt.standing_posture import feet_are_level, standing_legs
+from wbc_suite.robot.adopt.working_posture import working_arms
+from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.elements import Frame, Link, rigid_bodies
+from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
 from wbc_suite.robot.validation import RESERVED
-from wbc_suite.robot.working_posture import working_arms
 from wbc_suite.tomlfile import parse_model
 
 LOG = logs.logger(__name__)

@@ -1,0 +1,1 @@
+"""What is guessed about robots of foreign files: limbs, grippers, postures, motors."""
