@@ -1,7 +1,5 @@
 """Two-arm benchmarks are not solved by one arm, however the robots stand."""
 
-import math
-
 import pytest
 from conftest import put
 
@@ -17,9 +15,8 @@ HOLDING = [(True, True), (True, False), (False, True), (False, False)]
 
 def hold(monkeypatch, task, holding):
     for hand, holds in zip(task.hands, holding, strict=True):
-        for measure in ("grasps", "clamps"):
+        for measure in ("grasps", "bears"):
             monkeypatch.setattr(hand, measure, lambda *_, holds=holds: holds)
-        monkeypatch.setattr(hand, "friction", lambda _: math.inf)
     holders = [hand for hand, holds in zip(task.hands, holding, strict=True) if holds]
     monkeypatch.setattr(task.scene, "hands_at", lambda _: holders)
 

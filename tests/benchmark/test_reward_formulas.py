@@ -179,20 +179,27 @@ def test_a_hole_of_the_wrench_is_on_the_arm_of_the_frame(hole, passes, shift):
 
 
 @pytest.mark.parametrize(
-    ("clamps", "slip", "friction", "holds"),
+    ("grasps", "slip", "spin", "most", "holds"),
     [
-        *((True, 0.19, 1.1, True), (True, 0.21, 1.1, False)),
-        *((False, 0.0, 1.1, False), (True, 0.19, 0.9, False)),
+        *((True, 0.19, 0.9, 2.5, True), (True, 0.21, 0.9, 2.5, False)),
+        *((True, 0.19, 1.1, 2.5, False), (True, 0.19, 0.9, 2.3, False)),
+        (False, 0.0, 0.0, 2.5, False),
     ],
 )
-def test_a_held_object_moves_with_the_hand_that_bears_it(clamps, slip, friction, holds):
-    task = stub(states={"cube": stub(body=4, weight=2.0)}, grip_angle=0.5)
+def test_a_held_object_moves_with_the_hand_that_bears_it(
+    grasps, slip, spin, most, holds
+):
+    task = stub(states={"cube": stub(body=4, weight=2.0)})
     hand = stub(
-        clamps=lambda geoms, angle: clamps,
+        grasps=lambda geoms: grasps,
         slip=lambda body: slip,
-        friction=lambda geoms: friction,
+        spin=lambda body: spin,
+        bears=lambda geoms, load: load < most,
     )
     assert Predicates.holds(task, hand, "cube", {1}) == holds
+    assert Predicates.holds(task, hand, "cube", {1}, share=0.5) == (
+        grasps and slip < 0.2 and spin < 1.0
+    )
 
 
 def furnished(name):

@@ -133,7 +133,9 @@ class TwoArmLift(ObjectBenchmark):
         return (
             self.height > self.config.reward.lift_height
             and self.level
-            and all(self.scene.holds(hand, POT, geoms) for hand in self.hands)
+            and all(
+                self.scene.holds(hand, POT, geoms, share=0.5) for hand in self.hands
+            )
         )
 
     def progress(self) -> float:
