@@ -54,6 +54,7 @@ ALL = (
     *("Stand", "WalkTo", "Reach", "LocoLift", "Carry"),
 )
 SCENES = 50  # tries in each scene
+SETTLING = 150  # physics steps after which what is held is asked for again
 
 
 class Search:
@@ -78,8 +79,10 @@ class Search:
             self.states.begin()
         while not self.states.draw():
             self.overlaps += 1
-        verdict = self.task.success()
-        truth, margins = judged(self.judge(self.world))
+        verdict, truth, margins = self._verdicts()
+        if truth and not verdict and type(self.states) is Things:
+            self.world.run(SETTLING)  # grips may still slide to where they hold
+            verdict, truth, margins = self._verdicts()
         kind = {None: "undecided", verdict: "right"}.get(truth, "false")
         self.counts[kind] += 1
         self.done += bool(truth and verdict)
@@ -87,6 +90,11 @@ class Search:
             side = "success" if verdict else "failure"
             one = {"try": number, "side": side, "margins": margins}
             self.found.append(one | {"qpos": self.world.data.qpos.tolist()})
+
+    def _verdicts(self) -> tuple[bool, bool | None, list[float]]:
+        """Return the benchmark's verdict, the judge's, and its margins."""
+        verdict = self.task.success()
+        return verdict, *judged(self.judge(self.world))
 
 
 def main() -> None:

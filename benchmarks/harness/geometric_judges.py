@@ -286,10 +286,6 @@ def wipe(world: World) -> Iterator[float]:
     """
     task, data = world.task, world.data
     hands = [[g for g in world.robot.tolist() if h.owns(g)] for h in task.hands]
-    other = set(world.robot.tolist()).difference(*hands)
-    if any(not other.isdisjoint(pair) for pair in data.contact.geom.tolist()):
-        yield 0.0  # the force is not that of hands alone
-        return
     (root,) = world.roots.tolist()
     first = int(world.model.jnt_dofadr[world.model.body_jntadr[root]])
     force = data.qfrc_constraint.item(first + 2)

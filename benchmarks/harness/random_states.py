@@ -237,8 +237,16 @@ class Things(States):
 class Wiping(States):
     """Hands that press on the table, hover over it or stand on an edge; few marks left.
 
-    The robot as a whole is moved so that its lowest hand touches.
+    The robot as a whole is moved so that its lowest hand touches. Its other parts do
+    not collide.
     """
+
+    def __init__(self, world: World, rng: np.random.Generator) -> None:
+        super().__init__(world, rng)
+        hands = world.task.hands
+        self._hands = [g for g in world.robot.tolist() if any(h.owns(g) for h in hands)]
+        others = np.setdiff1d(world.robot, self._hands)
+        self.model.geom_contype[others] = self.model.geom_conaffinity[others] = 0
 
     def reach(self) -> bool:
         """Bring the hands over the table."""
@@ -260,14 +268,14 @@ class Wiping(States):
         mujoco.mj_kinematics(self.model, data)
         hand = task.hands[int(rng.integers(len(task.hands)))]
         tilt = rng.normal(0.0, rng.choice([0.0, 0.0, 0.002, 0.05, 0.4]), 3)
-        turn = rotation(tilt + [0.0, 0.0, rng.uniform(-3.1, 3.1)]) @ DOWN
+        tilt[2] += rng.uniform(-3.1, 3.1)
+        turn = rotation(tilt) @ DOWN
         R = turn @ data.site_xmat[hand.site].reshape(3, 3).T
         data.qpos[first + 3 : first + 7] = quat_of(
             R @ matrix(data.qpos[first + 3 : first + 7].copy())
         )
         mujoco.mj_kinematics(self.model, data)
-        geoms = [g for g in world.robot.tolist() if any(h.owns(g) for h in task.hands)]
-        points = world.points(geoms)
+        points = world.points(self._hands)
         low = points[points[:, 2].argmin()]
         goal = np.add(task.config.table.center, rng.uniform(-0.2, 0.2, 3) * [1, 1, 0])
         goal[2] -= rng.choice([1e-4, 5e-4, 2e-3, -3e-4, -3e-3])

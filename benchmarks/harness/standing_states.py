@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from harness.geometric_judges import Look, inside
-from harness.random_states import States, quat_of, rotation
+from harness.random_states import DEEP, States, quat_of, rotation
 from harness.rigid_world import World
 from wbc_suite.typing import Matrix, Vector
 
@@ -82,13 +82,15 @@ class OnFeet(States):
         self.world.history, self._now = [], self.begins()
         self.stand()
         self.place()
+        if self.world.deepest() > 3 * DEEP:
+            return False
         looks = int(rng.choice([12, 20, 22, 26, 30], p=[0.1, 0.3, 0.3, 0.2, 0.1]))
         event = int(rng.integers(looks)) if rng.random() < 0.3 else -1
         for k in range(looks):
             if k == event:
                 self.disturb()
             self.look()
-        return True
+        return self.world.deepest() < DEEP
 
     def begins(self) -> float:
         """Return the time before the first look, s."""
@@ -129,16 +131,14 @@ class OnFeet(States):
         mujoco.mju_quat2Mat(R, quat)
         quat[:] = quat_of(rotation(by) @ R.reshape(3, 3))
 
-    def look(self, steps: int = STEPS) -> None:
+    def look(self) -> None:
         """Let physics go on, let the benchmark look, and note what a judge needs."""
         model, data = self.model, self.data
         bodies = [self.root, *(self.model.body(n).id for n in self.followed())]
-        if steps:
-            mujoco.mj_step(model, data, steps - 1)
-            mujoco.mj_kinematics(model, data)
+        mujoco.mj_step(model, data, STEPS - 1)
+        mujoco.mj_kinematics(model, data)
         before = [self._pose(body) for body in bodies]
-        if steps:
-            mujoco.mj_step(model, data)
+        mujoco.mj_step(model, data)
         self._now += PERIOD
         data.time = self._now
         mujoco.mj_forward(model, data)
@@ -286,7 +286,7 @@ class ReachStates(OnFeet):
             body = int(self.model.site_bodyid[hand.site])
             R = self.data.xmat[body].reshape(3, 3)
             at = self.data.xpos[body] + R @ self.model.site_pos[hand.site]
-            goal = self.data.geom(f"target_{hand.name}_0").xpos
+            goal = self.data.body(f"target_{hand.name}").xpos
             yield (self.task.config.target.near - math.dist(at, goal)) / 5e-4
         yield self.rests(moves[0])
 
@@ -328,7 +328,7 @@ class LocoLiftStates(OnFeet):
         yield (high - config.reward.lift_height) / 0.001
         yield (config.reward.speed - cube.speed) / 0.005
         yield self.stands()
-        yield max((0.2 - cube.turn) / 0.1, -0.5)
+        yield max((1.0 - cube.turn) / 0.3, -0.5)
         own = [g for g in self.world.robot.tolist() if self.hand.owns(g)]
         yield (2e-4 - self.world.gap("cube", own)) / 2e-4
 
@@ -392,8 +392,13 @@ class CarryStates(OnFeet):
     def _pose_pot(self, at: Vector, looks: int) -> None:
         """Let the benchmark see the pot somewhere, without physics."""
         self._put(at, np.eye(3))
+        touches = self._touched()
         for _ in range(looks):
-            self.look(steps=0)
+            self._now += PERIOD
+            self.data.time = self._now
+            self.task.after_step()
+            self._follow(*touches)
+            self.world.history.append(Look(upright=2.0, margin=-2.0))
 
     def followed(self) -> Iterable[str]:
         """Return the pot."""
@@ -402,7 +407,7 @@ class CarryStates(OnFeet):
     def margins(self, moves: list[Motion]) -> Iterable[float]:
         """Yield whether it was carried, and how it stands on the other table."""
         world, config, (_, pot) = self.world, self.task.config, moves
-        self._follow()
+        self._follow(*self._touched())
         yield self.carried
         x, y = np.abs(pot.after[0] - config.other)[:2]
         ends = np.array(config.table.size[:2]) / 2 - config.carrying.margin
@@ -418,15 +423,16 @@ class CarryStates(OnFeet):
         yield (0.2 - pot.turn) / 0.1
         yield self.stands()
 
-    def _follow(self) -> None:
-        """Follow who carries the pot, by distances."""
-        world, names = self.world, ("table_from", "table_to", "floor")
+    def _touched(self) -> tuple[list[bool | None], list[bool | None]]:
+        """Return whether the pot touches both tables and the floor, and each hand."""
+        names = ("table_from", "table_to", "floor")
+        robot = self.world.robot.tolist()
+        hands = [[g for g in robot if hand.owns(g)] for hand in self.task.hands]
         tops = [self._touches([self.model.geom(name).id]) for name in names]
-        robot = world.robot.tolist()
-        hands = [
-            self._touches([g for g in robot if hand.owns(g)])
-            for hand in self.task.hands
-        ]
+        return tops, [self._touches(own) for own in hands]
+
+    def _follow(self, tops: list[bool | None], hands: list[bool | None]) -> None:
+        """Follow who carries the pot."""
         if None in (*tops, *hands):
             self.carried = 0.0 if self.carried > -1.0 else self.carried
             return

@@ -70,7 +70,8 @@ def test_a_cube_that_fingers_clamp_at_an_edge_is_not_lifted(env, cube, robot):
     env.benchmark.states["cube"].resize_box([0.021459] * 3, density=700.0)
     env.simulation.data.qpos[:] = cube + robot
     mujoco.mj_forward(env.simulation.model, env.simulation.data)
-    assert env.benchmark.scene.grasped("cube")
+    hand = env.benchmark.hands[0]
+    assert hand.clamps(env.benchmark.states["cube"].geoms, np.radians(120.0))
     assert not env.benchmark.success()
 
 

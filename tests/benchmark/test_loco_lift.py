@@ -24,6 +24,7 @@ def before_the_table(env):
 def grip(env, monkeypatch, held=True):
     hand = env.benchmark.hands[0]
     monkeypatch.setattr(hand, "grasps", lambda geoms: held)
+    monkeypatch.setattr(hand, "clamps", lambda geoms, angle: held)
     monkeypatch.setattr(hand, "bears", lambda geoms, load: held)
     monkeypatch.setattr(hand, "slip", lambda body: 0.0)
     monkeypatch.setattr(hand, "spin", lambda body: 0.0)

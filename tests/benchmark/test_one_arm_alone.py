@@ -4,6 +4,7 @@ import pytest
 from conftest import put
 
 import wbc_suite
+from wbc_suite.benchmark import predicates
 
 WAYS = [
     pytest.param(["Panda", "Panda"], "opposed", id="opposed"),
@@ -15,8 +16,9 @@ HOLDING = [(True, True), (True, False), (False, True), (False, False)]
 
 def hold(monkeypatch, task, holding):
     for hand, holds in zip(task.hands, holding, strict=True):
-        for measure in ("grasps", "bears"):
+        for measure in ("grasps", "clamps", "bears"):
             monkeypatch.setattr(hand, measure, lambda *_, holds=holds: holds)
+    monkeypatch.setattr(predicates, "bear", lambda *_: True)
     holders = [hand for hand, holds in zip(task.hands, holding, strict=True) if holds]
     monkeypatch.setattr(task.scene, "hands_at", lambda _: holders)
 

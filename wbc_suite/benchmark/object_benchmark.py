@@ -18,7 +18,7 @@ from wbc_suite.benchmark.arrangement import (
     arrange_two_arms,
 )
 from wbc_suite.benchmark.falls import fall_of
-from wbc_suite.benchmark.predicates import Predicates
+from wbc_suite.benchmark.predicates import GRIP_ANGLE, Predicates
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, PlacementError
 from wbc_suite.robot import RobotDescription
@@ -107,11 +107,13 @@ class ObjectBenchmark(ABC):
             it, by name, after `bind`.
         hands: The hands of all robots, after `bind`.
         scene: What holds between things and hands now, after `bind`.
+        grip_angle: See `Predicates`.
     """
 
     robots: Sequence[str] = ("Panda",)
     gripper: str | None = None
     needs_gripper = True
+    grip_angle = GRIP_ANGLE
     pushes: Sequence[Push] = ()
     sampler: Sampler | None
 
@@ -195,7 +197,9 @@ class ObjectBenchmark(ABC):
         things = self.objects()
         self.states = {t.name: ObjectState(model, data, t.name) for t in things}
         self._own = tuple(self.states)
-        self.scene = Predicates(data, self.states, self.hands, robot_geoms)
+        self.scene = Predicates(
+            data, self.states, self.hands, robot_geoms, grip_angle=self.grip_angle
+        )
         self._bind_arena()
         self.grasps = {t.name: t.grasps for thing in things for t in thing.family()}
 

@@ -1,6 +1,7 @@
 """Hands of a robot in a scene: positions and grasps."""
 
-from collections.abc import Collection, Sequence
+import itertools
+from collections.abc import Collection, Iterable, Sequence
 
 import mujoco
 import numpy as np
@@ -62,43 +63,32 @@ class Hand:
         }
         return len(touching - {None}) >= 2
 
-    def bears(self, geoms: Collection[int], load: float) -> bool:
-        """Whether the grip of an object can bear a load in any direction, N.
+    def clamps(self, geoms: Collection[int], angle: float) -> bool:
+        """Whether links touch an object from opposite sides.
 
-        It can if forces in the friction cones of its contacts balance the load, whose
-        normal parts sum to no more than now. With p_k and e_k the point and the edges
-        of the cones, c the middle of the contacts and d each of +-x, +-y, +-z,
-
-            sum l_k e_k = -load d,  sum l_k (p_k - c) x e_k = 0,
-            l_k >= 0,  sum l_k <= sum F_n
-
-        has a solution. The load acts at the middle of the contacts: it may swing.
-
-        Source: Ferrari and Canny (1992), "Planning Optimal Grasps", ICRA.
+        These are two, the normals of whose contacts are at least an angle apart, rad,
+        or three: what those can hold depends on more than two normals, see `bear`.
         """
-        from scipy.optimize import nnls  # takes 0.1 s to import
+        touching: list[tuple[int, Vector]] = []
+        for pair, frame in zip(
+            pairs_in_contact(self._data), self._data.contact.frame, strict=True
+        ):
+            for own, other, side in ((*pair, 1.0), (*pair[::-1], -1.0)):
+                if own in self._body_of and other in geoms:
+                    touching.append((self._body_of[own], side * frame[:3]))
+        return len({link for link, _ in touching}) > 2 or any(
+            a != b and float(n @ m) < np.cos(angle)
+            for (a, n), (b, m) in itertools.combinations(touching, 2)
+        )
 
-        contacts, total = self._contacts(geoms)
-        if total <= 0.0:
-            return False
-        middle = sum(point * force for point, _, force in contacts) / total
-        edges = np.vstack([cone for _, cone, _ in contacts])
-        arms = np.repeat([point - middle for point, *_ in contacts], len(EDGES), axis=0)
-        wrenches = np.hstack([edges, np.cross(arms, edges) / ARM])
-        A = np.zeros((7, len(edges) + 1))
-        A[:6, :-1], A[6] = wrenches.T, 1.0
-        for way in (*np.eye(3), *-np.eye(3)):
-            wanted = np.array([*(load / total * way), 0.0, 0.0, 0.0, 1.0])
-            if nnls(A, wanted)[1] > BALANCED:
-                return False
-        return True
+    def bears(self, geoms: Collection[int], load: float) -> bool:
+        """Whether its grip of an object can bear a load, N, in any direction."""
+        return bear([self], geoms, load)
 
-    def _contacts(
-        self, geoms: Collection[int]
-    ) -> tuple[list[tuple[Vector, Matrix, float]], float]:
-        """Return contacts with an object, and the sum of their normal forces, N.
+    def contacts(self, geoms: Collection[int]) -> list[tuple[Vector, Matrix, float]]:
+        """Return contacts with an object: points, edges of friction cones, forces.
 
-        Each has its point, the edges of its friction cone and its normal force.
+        Points are in m, normal forces in N; edges have shape (8, 3).
         """
         data, found, force = (
             self._data,
@@ -113,7 +103,7 @@ class Hand:
             normal, *tangents = side * data.contact.frame[k].reshape(3, 3)
             cone = normal + data.contact.friction[k, :2] * EDGES @ np.array(tangents)
             found.append((data.contact.pos[k], cone, force.item(0)))
-        return found, sum(one[-1] for one in found)
+        return found
 
     def slip(self, body: int) -> float:
         """Return the speed of a body's centre of mass relative to the hand, m/s.
@@ -137,6 +127,39 @@ class Hand:
         mujoco.mj_objectVelocity(model, data, kinds.mjOBJ_SITE, self.site, hand, 0)
         mujoco.mj_objectVelocity(model, data, kinds.mjOBJ_BODY, body, other, 0)
         return self._twists
+
+
+def bear(hands: Iterable[Hand], geoms: Collection[int], load: float) -> bool:
+    """Whether hands can together bear a load at an object in any direction, N.
+
+    They can if forces in the friction cones of their contacts balance the load, whose
+    normal parts sum to no more than now. With p_k and e_k the point and the edges of
+    the cones, c the middle of the contacts and d each of +-x, +-y, +-z,
+
+        sum l_k e_k = -load d,  sum l_k (p_k - c) x e_k = 0,
+        l_k >= 0,  sum l_k <= sum F_n
+
+    has a solution. The load acts at the middle of the contacts: the object may swing.
+
+    Source: Ferrari and Canny (1992), "Planning Optimal Grasps", ICRA.
+    """
+    from scipy.optimize import nnls  # takes 0.1 s to import
+
+    contacts = [contact for hand in hands for contact in hand.contacts(geoms)]
+    total = sum(force for *_, force in contacts)
+    if total <= 0.0:
+        return False
+    middle = sum(point * force for point, _, force in contacts) / total
+    edges = np.vstack([cone for _, cone, _ in contacts])
+    arms = np.repeat([point - middle for point, *_ in contacts], len(EDGES), axis=0)
+    A = np.ones((7, len(edges) + 1))
+    A[:3, :-1], A[3:6, :-1] = edges.T, np.cross(arms, edges).T / ARM
+    A[:6, -1] = 0.0
+    for way in (*np.eye(3), *-np.eye(3)):
+        wanted = np.array([*(load / total * way), 0.0, 0.0, 0.0, 1.0])
+        if nnls(A, wanted)[1] > BALANCED:
+            return False
+    return True
 
 
 def hands_of(state: RobotState) -> tuple[Hand, ...]:
