@@ -10,16 +10,19 @@ drawn anew; those that are too near to a bound are undecided.
 
 Usage: python benchmarks/two_sided.py [BENCHMARK ...] [--robots R[,R] ...]
     [--tries 10000] [--seed 0] [--quick] [--json FILE]
+       python benchmarks/two_sided.py --table FILE
 """
 
+import json
 import time
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from harness.geometric_judges import JUDGES, judged
 from harness.random_states import Doors, Pegs, States, Things, Wiping
-from harness.report import Report, options
+from harness.report import Report, options, write_between
 from harness.rigid_world import World
 from harness.standing_states import (
     CarryStates,
@@ -53,6 +56,8 @@ ALL = (
     *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover", "TwoArmTransport"),
     *("Stand", "WalkTo", "Reach", "LocoLift", "Carry"),
 )
+PAGE = Path(__file__).parent.parent / "docs" / "evaluation.md"
+MARKS = "<!-- verdicts -->", "<!-- end of verdicts -->"
 SCENES = 50  # tries in each scene
 SETTLING = 150  # physics steps after which what is held is asked for again
 
@@ -97,6 +102,20 @@ class Search:
         return verdict, *judged(self.judge(self.world))
 
 
+def table(rows: list[dict[str, Any]]) -> str:
+    """Return the results as a table in Markdown."""
+    lines = [
+        "| benchmark | robots | tries | true | undecided | false successes "
+        "| false failures |",
+        "|---|---|---:|---:|---:|---:|---:|",
+    ]
+    keys = ("case", "side", "tries", "done", "undecided", "false_success")
+    for row in rows:
+        cells = [str(row.get(key, 0)) for key in (*keys, "false_failure")]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def main() -> None:
     """Search in the benchmarks that the arguments name."""
     parser = options(__doc__, "60 tries of three benchmarks")
@@ -104,7 +123,12 @@ def main() -> None:
     parser.add_argument("--robots", nargs="+")
     parser.add_argument("--tries", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--table", type=Path, help="write docs/evaluation.md from it")
     given = parser.parse_args()
+    if given.table:
+        rows = json.loads(given.table.read_text("utf-8"))["rows"]
+        write_between(PAGE, table(rows), MARKS)
+        return
     report, tries = Report(), 60 if given.quick else given.tries
     names = given.benchmarks or (ALL[:3] if given.quick else ALL)
     for name in names:
