@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from harness.geometric_judges import JUDGES, judged
-from harness.random_states import Doors, Pegs, States, Things, Wiping
+from harness.random_states import Doors, Pegs, Pots, States, Things, Wiping
 from harness.report import Report, options, write_between
 from harness.rigid_world import World
 from harness.standing_states import (
@@ -44,6 +44,7 @@ ROBOTS = {
 """One arm with a jaw, with fingers; two arms; a humanoid. On feet: none, one, two."""
 STATES: dict[str, type[States]] = {
     **{"Door": Doors, "TwoArmPegInHole": Pegs, "Wipe": Wiping},
+    "TwoArmLift": Pots,
     **{"Stand": StandStates, "WalkTo": WalkToStates, "Reach": ReachStates},
     **{"LocoLift": LocoLiftStates, "Carry": CarryStates},
 }
@@ -67,7 +68,7 @@ class Search:
 
     def __init__(self, name: str, robots: str, seed: int) -> None:
         draws = STATES.get(name, Things)
-        free = draws not in (Doors, Pegs, Things)
+        free = not issubclass(draws, Doors | Pegs | Things)
         self.world = World(name, robots.split(","), free=free)
         self.task: Any = self.world.task
         self.states = draws(self.world, np.random.default_rng(seed))
@@ -85,7 +86,7 @@ class Search:
         while not self.states.draw():
             self.overlaps += 1
         verdict, truth, margins = self._verdicts()
-        if truth and not verdict and type(self.states) is Things:
+        if truth and not verdict and isinstance(self.states, Things):
             self.world.run(SETTLING)  # grips may still slide to where they hold
             verdict, truth, margins = self._verdicts()
         kind = {None: "undecided", verdict: "right"}.get(truth, "false")

@@ -47,8 +47,8 @@ def clamped(world: World, name: str, hands: Iterable[Any]) -> Iterator[float]:
     """Yield the margins of hands that hold a thing whichever way it is pulled.
 
     Fingers do not follow here, so that what is held creeps: 0.2 s are looked at, in
-    which what falls moves by 20 cm. Nor do they press: less than 40 um of overlap, about
-    the weight of a cube, may be a cage and no clamp.
+    which what falls moves by 20 cm. Nor do they press: 40 um of overlap, about
+    the weight of a cube, are a clamp; less may be a cage.
     """
     hands = list(hands)
     for hand in hands:
@@ -187,8 +187,16 @@ def lift(world: World) -> Iterator[float]:
     config = world.task.config
     high = world.data.body("cube").xpos[2] - config.table.center[2]
     yield (high - config.reward.lift_height) / 0.001
+    yield from in_one_hand(world)
+
+
+def in_one_hand(world: World) -> Iterator[float]:
+    """A hand holds the cube; with the help of another one it is not decided."""
     near = min(world.task.hands, key=lambda h: math.dist(h.position, _cube(world)))
     yield from clamped(world, "cube", [near])
+    others = [h for h in world.task.hands if h is not near]
+    own = [g for g in world.robot.tolist() if any(h.owns(g) for h in others)]
+    yield max((world.gap("cube", own) - 2e-4) / 2e-4, 0.0) if own else 2.0
 
 
 def _cube(world: World) -> Vector:
@@ -275,8 +283,7 @@ def on_feet(world: World) -> Iterator[float]:
 def loco_lift(world: World) -> Iterator[float]:
     """The robot has long held the cube in a hand, standing."""
     yield from on_feet(world)
-    near = min(world.task.hands, key=lambda h: math.dist(h.position, _cube(world)))
-    yield from clamped(world, "cube", [near])
+    yield from in_one_hand(world)
 
 
 def wipe(world: World) -> Iterator[float]:

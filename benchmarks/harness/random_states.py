@@ -27,12 +27,13 @@ class States:
 
     Attributes:
         free: Names of the things that are put somewhere.
+        pose: Number of the robots' pose.
     """
 
     def __init__(self, world: World, rng: np.random.Generator) -> None:
         self.world, self.rng, self.task = world, rng, world.task
         self.model, self.data = world.model, world.data
-        self._poses: list[Vector] = []
+        self._poses, self.pose = list[Vector](), 0
         self.free: list[str] = []
 
     def begin(self) -> None:
@@ -54,9 +55,10 @@ class States:
         return False
 
     def take_pose(self) -> None:
-        """Give the robots one of their poses."""
+        """Give the robots one of their poses, whose number is `pose`."""
         moving = self.world.moving
-        moving.data.qpos[:] = self._poses[int(self.rng.integers(len(self._poses)))]
+        self.pose = int(self.rng.integers(len(self._poses)))
+        moving.data.qpos[:] = self._poses[self.pose]
         mujoco.mj_kinematics(moving.model, moving.data)
         self.world.pose()
 
@@ -232,6 +234,42 @@ class Things(States):
             turn = rotation(np.array([0.0, 0.0, rng.uniform(-1.5, 1.5)]))
             moving.bring(hand, goal + rng.normal(0.0, 0.02, 3) + up, turn @ DOWN)
         return True
+
+
+class Pots(Things):
+    """A pot in the air with both hands at its handles, in one hand or elsewhere."""
+
+    def begin(self) -> None:
+        """Draw a scene, and where the pot is for each pose of the robots."""
+        self._pots: list[tuple[Vector, Matrix]] = []
+        super().begin()
+
+    def reach(self) -> bool:
+        """Bring each hand to a grasp of its own handle."""
+        rng, moving, config = self.rng, self.world.moving, self.task.config
+        at = np.add(config.table.center, (*rng.normal(0.0, 0.03, 2), 0.0))
+        at[2] += config.pot.half_size[2] + rng.uniform(0.08, 0.25)
+        tilt = rng.normal(0.0, rng.choice([0.0, 0.1, 0.4]), 3)
+        R = rotation(tilt) @ rotation(np.array([0.0, 0.0, np.pi]))
+        for hand, side in enumerate((1.0, -1.0)):
+            sites = [
+                site.pose
+                for site in self.task.grasps["pot"]
+                if side * site.pose.translation[1] > 0.0
+            ]
+            site = sites[int(rng.integers(len(sites)))]
+            moving.bring(hand, at + R @ site.translation, R @ site.rotation)
+        self._pots.append((at, R))
+        return True
+
+    def put_in(self, name: str, hand: Any) -> None:
+        """Put the pot between both hands, or into one."""
+        if self.pose == 0 or self.rng.random() < 0.2:
+            super().put_in(name, hand)
+            return
+        at, R = self._pots[self.pose - 1]
+        off = self.rng.normal(0.0, self.rng.choice([0.001, 0.004]), 3)
+        self.task.states[name].move(at + off, quat_of(R))
 
 
 class Wiping(States):
