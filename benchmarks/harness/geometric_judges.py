@@ -191,12 +191,33 @@ def lift(world: World) -> Iterator[float]:
 
 
 def in_one_hand(world: World) -> Iterator[float]:
-    """A hand holds the cube; with the help of another one it is not decided."""
+    """A hand holds the cube; with the help of another one it is not decided.
+
+    Nor are cubes between two links at edges: rigid fingers hold what is lost within 0.1
+    s by those that give way (tests/benchmark/test_lift.py).
+    """
     near = min(world.task.hands, key=lambda h: math.dist(h.position, _cube(world)))
     yield from clamped(world, "cube", [near])
+    yield max(_opposition(world, near), -0.5)
     others = [h for h in world.task.hands if h is not near]
     own = [g for g in world.robot.tolist() if any(h.owns(g) for h in others)]
     yield max((world.gap("cube", own) - 2e-4) / 2e-4, 0.0) if own else 2.0
+
+
+def _opposition(world: World, hand: Any) -> float:
+    """Return the margin of two links that touch the cube from opposite sides."""
+    contact, (cube,) = world.data.contact, world.geoms("cube")
+    sides: dict[int, list[Vector]] = {}
+    for (a, b), frame in zip(contact.geom.tolist(), contact.frame, strict=True):
+        other = b if a == cube else a
+        if cube in (a, b) and hand.owns(other):
+            side = frame[:3] if b == cube else -frame[:3]
+            sides.setdefault(int(world.model.geom_bodyid[other]), []).append(side)
+    if len(sides) != 2:
+        return 2.0
+    first, second = (np.array(normals) for normals in sides.values())
+    widest = math.degrees(math.acos(np.clip((first @ second.T).min(), -1.0, 1.0)))
+    return (widest - 162.0) / 2.0
 
 
 def _cube(world: World) -> Vector:
@@ -211,6 +232,11 @@ def two_arm_lift(world: World) -> Iterator[float]:
     yield (high - config.reward.lift_height) / 0.001
     yield (pot.xmat[8] - math.cos(config.reward.tilt)) / 0.01
     yield from clamped(world, "pot", world.task.hands)
+    for hand in world.task.hands:
+        others = [g for g in world.robot.tolist() if not hand.owns(g)]
+        with world.without(others):  # each clamps it, the other one does not do it all
+            for way in 0.3 * WAYS:
+                yield (0.03 - world.pulled("pot", way, hand)) / 0.02
 
 
 def handover(world: World) -> Iterator[float]:

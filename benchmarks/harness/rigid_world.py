@@ -5,7 +5,8 @@ one has none of them: links are as solid as rock, and a step costs as much as th
 the things alone. Robots stand on the floor by a free joint where a benchmark asks.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
@@ -181,6 +182,16 @@ class World:
         data.xfrc_applied[body, :3] = force
         mujoco.mj_forward(self.model, data)
         return moved
+
+    @contextmanager
+    def without(self, geoms: Sequence[int]) -> Iterator[None]:
+        """Let geoms touch nothing for a while."""
+        model = self.model
+        kept = model.geom_contype.copy(), model.geom_conaffinity.copy()
+        model.geom_contype[geoms] = model.geom_conaffinity[geoms] = 0
+        yield
+        model.geom_contype[:], model.geom_conaffinity[:] = kept
+        mujoco.mj_forward(model, self.data)
 
     def speed(self, name: str) -> tuple[float, float]:
         """Return the speeds of a free thing, m/s and rad/s."""
