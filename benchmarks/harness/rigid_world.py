@@ -13,6 +13,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc_suite.benchmark import load_benchmark
 from wbc_suite.control import RobotState
@@ -307,7 +308,7 @@ class MovingRobots:
         mujoco.mj_kinematics(model, data)
 
     @cached_property
-    def legs(self) -> Vector:
+    def legs(self) -> NDArray[np.bool_]:
         """Which degrees of freedom carry a foot."""
         model, legs = self.model, np.zeros(self.model.nv, dtype=bool)
         standing = getattr(self.task, "standing", None)
