@@ -6,170 +6,56 @@ holds surely from 1 on, surely not below -1, and is not decided between.
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
-import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from wbc_suite.envs import RobotEnv
+from harness.rigid_world import World
 from wbc_suite.typing import Matrix, Vector
 
-ANGLES = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
-NEAR = 0.004  # m, up to which distances are measured
 WAYS = 9.81 * np.array([(0, 0, -1), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0)])
 """Directions of gravity in which a hand must hold what it clamps."""
 
 
-class World:
-    """A scene whose robots stand still, as solid as rock.
+def released(world: World, name: str) -> float:
+    """Return the margin of no robot touching a thing."""
+    return (world.gap(name, world.robot) - 2e-4) / 2e-4
 
-    Attributes:
-        robot: Geoms of robots.
-        at: Places of robots' joints in `qpos`.
+
+def still(world: World, name: str) -> Iterator[float]:
+    """Yield the margins of a thing that is, and stays, where it is."""
+    v, w = world.speed(name)
+    yield (0.02 - v) / 0.01
+    yield (0.2 - w) / 0.1
+    moved = (0.003 - world.moved(name)) / 0.002
+    tips = moved < -1.0 and stays_placed(world, name)
+    yield -0.5 if tips else moved
+
+
+def stays_placed(world: World, name: str) -> bool:
+    """Whether what comes to rest after tipping is where it belongs, all the same.
+
+    What stands on an edge tips as slowly as one likes, so that no bound of its speed
+    keeps it from moving later.
     """
+    return world.after(1.5, lambda: world.placed(name))
 
-    def __init__(self, env: RobotEnv) -> None:
-        self.env, self.task = env, env.benchmark
-        self.model, self.data = env.simulation.model, env.simulation.data
-        self.placed: Callable[[str], bool] = lambda name: False
-        self._shapes: dict[tuple[int, bytes], Matrix] = {}
-        model = self.model
-        names = [model.body(k).name for k in range(model.nbody)]
-        own = np.array([name.startswith("robot") for name in names])
-        self.robot = np.flatnonzero(own[model.geom_bodyid] & (model.geom_contype > 0))
-        self._collide_with_things_only()
-        self._dofs = np.flatnonzero(own[model.dof_bodyid])
-        joints = np.flatnonzero(own[model.jnt_bodyid])
-        sizes = {0: 7, 1: 4}
-        self.at = np.concatenate(
-            [
-                np.arange(model.jnt_qposadr[j], model.jnt_qposadr[j] + sizes.get(k, 1))
-                for j, k in zip(joints, model.jnt_type[joints].tolist(), strict=True)
-            ]
-        )
 
-    def _collide_with_things_only(self) -> None:
-        """Leave out contacts of robots with themselves and furniture, and motors."""
-        model, bit = self.model, 1 << 20
-        model.geom_contype[self.robot], model.geom_conaffinity[self.robot] = bit, 0
-        for name in self.task.states:
-            model.geom_conaffinity[self.geoms(name)] |= bit
-        off = mujoco.mjtDisableBit
-        for flag in (off.mjDSBL_EQUALITY, off.mjDSBL_LIMIT, off.mjDSBL_ACTUATION):
-            model.opt.disableflags |= flag
-        model.opt.disableflags |= off.mjDSBL_FRICTIONLOSS
+def clamped(world: World, name: str, hands: Iterable[Any]) -> Iterator[float]:
+    """Yield the margins of hands that hold a thing whichever way it is pulled.
 
-    def geoms(self, name: str) -> list[int]:
-        """Return the solid geoms of a thing's body."""
-        model, body = self.model, self.model.body(name).id
-        own = (model.geom_bodyid == body) & (model.geom_contype > 0)
-        return np.flatnonzero(own).tolist()
-
-    def points(self, geoms: Iterable[int]) -> Matrix:
-        """Return vertices of geoms in the world, shape (n, 3), m."""
-        found = []
-        for geom in geoms:
-            R = self.data.geom_xmat[geom].reshape(3, 3)
-            key = geom, self.model.geom_size[geom].tobytes()
-            if key not in self._shapes:
-                self._shapes[key] = _vertices(self.model, geom)
-            found.append(self._shapes[key] @ R.T + self.data.geom_xpos[geom])
-        return np.vstack(found)
-
-    def gap(self, name: str, others: Iterable[int]) -> float:
-        """Return the distance of a thing to geoms, at most `NEAR`, m."""
-        mine, least = self.geoms(name), NEAR
-        others = np.asarray(list(others))
-        bounds = self.model.geom_rbound
-        for geom in mine:
-            away = self.data.geom_xpos[others] - self.data.geom_xpos[geom]
-            reach = bounds[others] + bounds[geom] + NEAR
-            near = (np.linalg.norm(away, axis=1) < reach) | (bounds[others] == 0.0)
-            for other in others[near].tolist():
-                gap = mujoco.mj_geomDistance(
-                    self.model, self.data, geom, other, NEAR, None
-                )
-                least = min(least, gap)
-        return least
-
-    def run(self, steps: int) -> None:
-        """Let physics go on around robots that do not move."""
-        model, data, at, dofs = self.model, self.data, self.at, self._dofs
-        still = data.qpos[at].copy()
-        data.qvel[dofs] = 0.0
-        for _ in range(steps):
-            mujoco.mj_step(model, data)
-            data.qpos[at], data.qvel[dofs] = still, 0.0
-        mujoco.mj_forward(model, data)
-
-    def after(
-        self, seconds: float, look: Callable[[], Any], gravity: Any = WAYS[0]
-    ) -> Any:
-        """Return what is seen after some time; the state is as before then."""
-        data, kind = self.data, mujoco.mjtState.mjSTATE_INTEGRATION
-        kept = np.empty(mujoco.mj_stateSize(self.model, kind))
-        mujoco.mj_getState(self.model, data, kept, kind)
-        self.model.opt.gravity[:] = gravity
-        self.run(round(seconds / self.model.opt.timestep))
-        seen = look()
-        self.model.opt.gravity[:] = WAYS[0]
-        mujoco.mj_setState(self.model, data, kept, kind)
-        mujoco.mj_forward(self.model, data)
-        return seen
-
-    def moved(self, name: str, seconds: float = 0.3, gravity: Any = WAYS[0]) -> float:
-        """Return how far a thing moves in some time, m."""
-        geoms = self.geoms(name)
-        before = self.points(geoms)
-        after = self.after(seconds, lambda: self.points(geoms), gravity)
-        return float(np.linalg.norm(after - before, axis=1).max())
-
-    def speed(self, name: str) -> tuple[float, float]:
-        """Return the speeds of a free thing, m/s and rad/s."""
-        v = self.data.joint(f"{name}_joint").qvel
-        return float(np.linalg.norm(v[:3])), float(np.linalg.norm(v[3:]))
-
-    def deepest(self) -> float:
-        """Return the deepest overlap of anything but robots with themselves, m."""
-        data, robot = self.data, np.zeros(self.model.ngeom, dtype=bool)
-        robot[self.robot] = True
-        pairs = data.contact.geom[: data.ncon]
-        other = ~robot[pairs].all(axis=1)
-        return -float(min(data.contact.dist[: data.ncon][other], default=0.0))
-
-    def released(self, name: str) -> float:
-        """Return the margin of no robot touching a thing."""
-        return (self.gap(name, self.robot) - 2e-4) / 2e-4
-
-    def still(self, name: str) -> Iterator[float]:
-        """Yield the margins of a thing that is, and stays, where it is."""
-        v, w = self.speed(name)
-        yield (0.02 - v) / 0.01
-        yield (0.2 - w) / 0.1
-        moved = (0.003 - self.moved(name)) / 0.002
-        tips = moved < -1.0 and self.stays_placed(name)
-        yield -0.5 if tips else moved
-
-    def stays_placed(self, name: str) -> bool:
-        """Whether what comes to rest after tipping is where it belongs, all the same.
-
-        What stands on an edge tips as slowly as one likes, so that no bound of its
-        speed keeps it from moving later.
-        """
-        return self.after(1.5, lambda: self.placed(name))
-
-    def clamped(self, name: str, hands: Iterable[Any]) -> Iterator[float]:
-        """Yield the margins of hands that hold a thing whichever way it is pulled.
-
-        Fingers do not follow here, so that what is held creeps: 0.2 s are looked at, in
-        which what falls moves by 20 cm.
-        """
-        for hand in hands:
-            own = [g for g in self.robot.tolist() if hand.owns(g)]
-            yield (2e-4 - self.gap(name, own)) / 2e-4
-        for way in WAYS:
-            yield (0.035 - self.moved(name, 0.2, way)) / 0.025
+    Fingers do not follow here, so that what is held creeps: 0.2 s are looked at, in
+    which what falls moves by 20 cm. Nor do they press: 40 um of overlap, about
+    the weight of a cube, are a clamp; less may be a cage.
+    """
+    hands = list(hands)
+    for hand in hands:
+        own = [g for g in world.robot.tolist() if hand.owns(g)]
+        yield (-world.gap(name, own) - 2e-5) / 2e-5
+    for way in WAYS:
+        yield (0.035 - world.pulled(name, way, hands[0])) / 0.025
 
 
 def judged(margins: Iterator[float]) -> tuple[bool | None, list[float]]:
@@ -206,9 +92,9 @@ def stack(world: World) -> Iterator[float]:
     middle = world.data.body("cubeA").xipos[:2]
     yield inside(b[b[:, 2] > b[:, 2].max() - 0.004][:, :2], middle) / 0.002
     for name in ("cubeA", "cubeB"):
-        yield world.released(name)
+        yield released(world, name)
     for name in ("cubeA", "cubeB"):
-        yield from world.still(name)
+        yield from still(world, name)
 
 
 def _down(world: World, name: str, middle: Any, size: Any) -> Iterator[float]:
@@ -240,8 +126,8 @@ def pick_place(world: World) -> Iterator[float]:
     for name in task.sorting.active:
         yield from down(name)
         yield _withdrawn(world, world.data.body(name).xpos)
-        yield world.released(name)
-        yield from world.still(name)
+        yield released(world, name)
+        yield from still(world, name)
 
 
 def nuts(world: World) -> Iterator[float]:
@@ -255,8 +141,8 @@ def nuts(world: World) -> Iterator[float]:
         yield (top + 0.045 - points[:, 2].max()) / 0.02
         yield (world.data.body(name).xmat[8] ** 2 - math.cos(0.35) ** 2) / 0.05
         yield _withdrawn(world, world.data.site(f"{name}_handle").xpos)
-        yield world.released(name)
-        yield from world.still(name)
+        yield released(world, name)
+        yield from still(world, name)
 
 
 def tool_hang(world: World) -> Iterator[float]:
@@ -281,9 +167,9 @@ def tool_hang(world: World) -> Iterator[float]:
     yield low / 0.002
     yield (world.gap("tool", world.geoms("base")) - 2e-4) / 2e-4
     for name in ("frame", "tool"):
-        yield world.released(name)
+        yield released(world, name)
     for name in ("tool", "frame"):
-        yield from world.still(name)
+        yield from still(world, name)
 
 
 def transport(world: World) -> Iterator[float]:
@@ -292,8 +178,8 @@ def transport(world: World) -> Iterator[float]:
     for name, where in (("payload", "target_bin"), ("trash", "trash_bin")):
         floor = np.add(world.data.body(where).xpos, (0.0, 0.0, config.wall))
         yield from _down(world, name, floor, config.size)
-        yield world.released(name)
-        yield from world.still(name)
+        yield released(world, name)
+        yield from still(world, name)
 
 
 def lift(world: World) -> Iterator[float]:
@@ -301,8 +187,37 @@ def lift(world: World) -> Iterator[float]:
     config = world.task.config
     high = world.data.body("cube").xpos[2] - config.table.center[2]
     yield (high - config.reward.lift_height) / 0.001
+    yield from in_one_hand(world)
+
+
+def in_one_hand(world: World) -> Iterator[float]:
+    """A hand holds the cube; with the help of another one it is not decided.
+
+    Nor are cubes between two links at edges: rigid fingers hold what is lost within 0.1
+    s by those that give way (tests/benchmark/test_lift.py).
+    """
     near = min(world.task.hands, key=lambda h: math.dist(h.position, _cube(world)))
-    yield from world.clamped("cube", [near])
+    yield from clamped(world, "cube", [near])
+    yield max(_opposition(world, near), -0.5)
+    others = [h for h in world.task.hands if h is not near]
+    own = [g for g in world.robot.tolist() if any(h.owns(g) for h in others)]
+    yield max((world.gap("cube", own) - 2e-4) / 2e-4, 0.0) if own else 2.0
+
+
+def _opposition(world: World, hand: Any) -> float:
+    """Return the margin of two links that touch the cube from opposite sides."""
+    contact, (cube,) = world.data.contact, world.geoms("cube")
+    sides: dict[int, list[Vector]] = {}
+    for (a, b), frame in zip(contact.geom.tolist(), contact.frame, strict=True):
+        other = b if a == cube else a
+        if cube in (a, b) and hand.owns(other):
+            side = frame[:3] if b == cube else -frame[:3]
+            sides.setdefault(int(world.model.geom_bodyid[other]), []).append(side)
+    if len(sides) != 2:
+        return 2.0
+    first, second = (np.array(normals) for normals in sides.values())
+    widest = math.degrees(math.acos(np.clip((first @ second.T).min(), -1.0, 1.0)))
+    return (widest - 162.0) / 2.0
 
 
 def _cube(world: World) -> Vector:
@@ -316,7 +231,12 @@ def two_arm_lift(world: World) -> Iterator[float]:
     high = bottom[2] - config.table.center[2]
     yield (high - config.reward.lift_height) / 0.001
     yield (pot.xmat[8] - math.cos(config.reward.tilt)) / 0.01
-    yield from world.clamped("pot", world.task.hands)
+    yield from clamped(world, "pot", world.task.hands)
+    for hand in world.task.hands:
+        others = [g for g in world.robot.tolist() if not hand.owns(g)]
+        with world.without(others):  # each clamps it, the other one does not do it all
+            for way in 0.3 * WAYS:
+                yield (0.03 - world.pulled("pot", way, hand)) / 0.02
 
 
 def handover(world: World) -> Iterator[float]:
@@ -327,7 +247,7 @@ def handover(world: World) -> Iterator[float]:
     yield (high - task.config.reward.lift_height) / 0.001
     own = [g for g in world.robot.tolist() if first.owns(g)]
     yield (world.gap("hammer", own) - 2e-4) / 2e-4
-    yield from world.clamped("hammer", [second])
+    yield from clamped(world, "hammer", [second])
 
 
 def peg(world: World) -> Iterator[float]:
@@ -361,7 +281,84 @@ def door(world: World) -> Iterator[float]:
     yield 2.0 if world.data.joint("door_panel_joint").qpos[0] > 0.0 else -2.0
 
 
+LOOKS = 20
+"""Looks, each after a control period, in which a robot must do what it should."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Look:
+    """What was seen at one moment of a robot on its feet.
+
+    Attributes:
+        upright: Margin of a robot that has not fallen.
+        margin: Margin of what must hold for `LOOKS` looks.
+    """
+
+    upright: float
+    margin: float
+
+
+def on_feet(world: World) -> Iterator[float]:
+    """The robot has not fallen, and has long done what it should."""
+    seen = world.history
+    yield min(look.upright for look in seen)
+    yield 2.0 if len(seen) >= LOOKS else -2.0
+    yield min(look.margin for look in seen[-LOOKS:])
+
+
+def loco_lift(world: World) -> Iterator[float]:
+    """The robot has long held the cube in a hand, standing."""
+    yield from on_feet(world)
+    yield from in_one_hand(world)
+
+
+def wipe(world: World) -> Iterator[float]:
+    """The hands press on the table, and all marks that were left lie below one of them.
+
+    A hand covers the convex hull of what is below the table's top. The force is that
+    of the constraints on the robot's root.
+    """
+    task, data = world.task, world.data
+    hands = [[g for g in world.robot.tolist() if h.owns(g)] for h in task.hands]
+    (root,) = world.roots.tolist()
+    first = int(world.model.jnt_dofadr[world.model.body_jntadr[root]])
+    force = data.qfrc_constraint.item(first + 2)
+    yield (force - task.config.reward.least_force) / 0.05
+    top, margin = task.config.table.center[2], task.config.margin
+    marks = task.marks[: world.left, :2]
+    covered = np.full((2, world.left), -np.inf)
+    for own in hands:
+        for k, height in enumerate((top - 1e-4, top + 1e-4)):
+            below = np.vstack([_section(world.points([g]), height) for g in own])
+            covered[k] = np.maximum(covered[k], [_within(below, m) for m in marks])
+    surely, maybe = covered.min(axis=1) + margin
+    yield min(surely, 0.006) / 0.003 if surely > 0.0 else min(maybe / 0.003, 0.5)
+
+
+def _section(points: Matrix, height: float) -> Matrix:
+    """Return what a convex hull covers of a plane, and of what is below, (n, 2)."""
+    low, high = points[points[:, 2] < height], points[points[:, 2] >= height]
+    if not len(low) or not len(high):
+        return low[:, :2]
+    a, b = low[:, None], high[None]
+    share = (height - a[..., 2]) / (b[..., 2] - a[..., 2])
+    cut = a[..., :2] + share[..., None] * (b[..., :2] - a[..., :2])
+    return np.vstack([low[:, :2], cut.reshape(-1, 2)])
+
+
+def _within(hull: Matrix, point: Vector) -> float:
+    """Return how far a point is inside a convex hull, m; a line has no inside."""
+    if not len(hull):
+        return -math.inf
+    around = np.array([[1.0, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, -1]]) * 1e-5
+    thick = (hull[:, None] + around).reshape(-1, 2)
+    return inside(thick, point)
+
+
 JUDGES: dict[str, Callable[[World], Iterator[float]]] = {
+    **dict.fromkeys(("Stand", "WalkTo", "Reach", "Carry"), on_feet),
+    "LocoLift": loco_lift,
+    "Wipe": wipe,
     "Door": door,
     "Lift": lift,
     "NutAssembly": nuts,
@@ -373,33 +370,3 @@ JUDGES: dict[str, Callable[[World], Iterator[float]]] = {
     "TwoArmPegInHole": peg,
     "TwoArmTransport": transport,
 }
-
-
-def _vertices(model: mujoco.MjModel, geom: int) -> Matrix:
-    """Return vertices of a geom in its own frame, m."""
-    kinds, size = mujoco.mjtGeom, model.geom_size[geom]
-    match model.geom_type[geom]:
-        case kinds.mjGEOM_MESH:
-            mesh = model.geom_dataid[geom]
-            first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-            return model.mesh_vert[first : first + count].astype(np.float64)
-        case kinds.mjGEOM_CYLINDER:
-            x, y = size[0] * np.cos(ANGLES), size[0] * np.sin(ANGLES)
-            ends = np.repeat([-size[1], size[1]], len(ANGLES))
-            return np.column_stack([np.tile(x, 2), np.tile(y, 2), ends])
-        case kinds.mjGEOM_CAPSULE:
-            ball = _ball(np.full(3, size[0]))
-            return np.vstack([np.add(ball, (0, 0, z)) for z in (-size[1], size[1])])
-        case kinds.mjGEOM_SPHERE:
-            return _ball(np.full(3, size[0]))
-        case kinds.mjGEOM_ELLIPSOID:
-            return _ball(size)
-        case _:
-            return size * np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-
-
-def _ball(radii: Vector) -> Matrix:
-    tilts = np.linspace(-np.pi / 2, np.pi / 2, 9)
-    a, b = (grid.ravel() for grid in np.meshgrid(ANGLES, tilts))
-    unit = np.column_stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)])
-    return radii * unit

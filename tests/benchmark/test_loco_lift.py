@@ -25,8 +25,9 @@ def grip(env, monkeypatch, held=True):
     hand = env.benchmark.hands[0]
     monkeypatch.setattr(hand, "grasps", lambda geoms: held)
     monkeypatch.setattr(hand, "clamps", lambda geoms, angle: held)
+    monkeypatch.setattr(hand, "bears", lambda geoms, load: held)
     monkeypatch.setattr(hand, "slip", lambda body: 0.0)
-    monkeypatch.setattr(hand, "friction", lambda geoms: 100.0)
+    monkeypatch.setattr(hand, "spin", lambda body: 0.0)
 
 
 def put_cube(env, z, velocity=(0.0, 0.0, 0.0)):
@@ -65,14 +66,14 @@ def test_near_misses_are_no_success(env, monkeypatch, z, velocity, held):
     assert 0.0 < task.reward(shaped=True) < 1.0
 
 
-@pytest.mark.parametrize(("clamps", "slip"), [(False, 0.0), (True, 0.3)])
+@pytest.mark.parametrize(("bears", "slip"), [(False, 0.0), (True, 0.3)])
 def test_a_cube_that_two_links_touch_is_held_only_if_clamped(
-    env, monkeypatch, clamps, slip
+    env, monkeypatch, bears, slip
 ):
     before_the_table(env)
     grip(env, monkeypatch)
     hand = env.benchmark.hands[0]
-    monkeypatch.setattr(hand, "clamps", lambda geoms, angle: clamps)
+    monkeypatch.setattr(hand, "bears", lambda geoms, load: bears)
     monkeypatch.setattr(hand, "slip", lambda body: slip)
     put_cube(env, TOP + 0.1)
     assert not count(env, 2 * HOLD).success()

@@ -1,11 +1,10 @@
 """Two-arm benchmarks are not solved by one arm, however the robots stand."""
 
-import math
-
 import pytest
 from conftest import put
 
 import wbc_suite
+from wbc_suite.benchmark import predicates
 
 WAYS = [
     pytest.param(["Panda", "Panda"], "opposed", id="opposed"),
@@ -17,9 +16,9 @@ HOLDING = [(True, True), (True, False), (False, True), (False, False)]
 
 def hold(monkeypatch, task, holding):
     for hand, holds in zip(task.hands, holding, strict=True):
-        for measure in ("grasps", "clamps"):
+        for measure in ("grasps", "clamps", "bears"):
             monkeypatch.setattr(hand, measure, lambda *_, holds=holds: holds)
-        monkeypatch.setattr(hand, "friction", lambda _: math.inf)
+    monkeypatch.setattr(predicates, "bear", lambda *_: True)
     holders = [hand for hand, holds in zip(task.hands, holding, strict=True) if holds]
     monkeypatch.setattr(task.scene, "hands_at", lambda _: holders)
 

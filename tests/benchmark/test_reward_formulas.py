@@ -1,6 +1,7 @@
 """Shaped rewards against the formulas that they state, without a simulation."""
 
 import math
+from functools import partial
 from types import SimpleNamespace
 
 import mujoco
@@ -179,19 +180,24 @@ def test_a_hole_of_the_wrench_is_on_the_arm_of_the_frame(hole, passes, shift):
 
 
 @pytest.mark.parametrize(
-    ("clamps", "slip", "friction", "holds"),
+    ("clamps", "slip", "spin", "most", "holds"),
     [
-        *((True, 0.19, 1.1, True), (True, 0.21, 1.1, False)),
-        *((False, 0.0, 1.1, False), (True, 0.19, 0.9, False)),
+        *((True, 0.19, 0.9, 2.5, True), (True, 0.21, 0.9, 2.5, False)),
+        *((True, 0.19, 1.1, 2.5, False), (True, 0.19, 0.9, 2.3, False)),
+        (False, 0.0, 0.0, 2.5, False),
     ],
 )
-def test_a_held_object_moves_with_the_hand_that_bears_it(clamps, slip, friction, holds):
+def test_a_held_object_moves_with_the_hand_that_bears_it(
+    clamps, slip, spin, most, holds
+):
     task = stub(states={"cube": stub(body=4, weight=2.0)}, grip_angle=0.5)
     hand = stub(
         clamps=lambda geoms, angle: clamps,
         slip=lambda body: slip,
-        friction=lambda geoms: friction,
+        spin=lambda body: spin,
+        bears=lambda geoms, load: load < most,
     )
+    task._moves_with = partial(Predicates._moves_with, task)
     assert Predicates.holds(task, hand, "cube", {1}) == holds
 
 

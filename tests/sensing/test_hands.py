@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wbc_suite
@@ -161,3 +162,72 @@ def test_classes_leave_numbers_and_capitals_at_the_end_out(bodies, classes):
     )
     found = Labels(model, []).names[SegmentationLevel.CLASS].values()
     assert set(found) == classes
+
+
+def grip_turned(scene, turn, aside=(0.0, 0.0), half_opening=None):
+    """Put the cube between the fingers, turned about the hand's axis."""
+    model, data, _ = scene
+    width = 0.02 * (np.cos(turn) + np.sin(turn))
+    hand, cube = grip(scene, half_opening or width - 0.0005, aside=aside)
+    turned = pin.Quaternion(pin.exp3(np.array([0.0, 0.0, turn])))
+    quat = np.empty(4)
+    about = np.array([turned.w, turned.x, turned.y, turned.z])
+    mujoco.mju_mulQuat(quat, data.joint("cube_joint").qpos[3:].copy(), about)
+    cube.move(data.joint("cube_joint").qpos[:3].copy(), tuple(quat))
+    mujoco.mj_forward(model, data)
+    return hand, cube
+
+
+@pytest.mark.parametrize(
+    ("turn", "friction", "bears"),
+    [
+        pytest.param(0.0, 1.0, True, id="faces"),
+        pytest.param(0.0, 0.5, True, id="smooth-faces"),
+        pytest.param(0.5, 1.0, True, id="corners"),
+        pytest.param(0.5, 0.2, False, id="smooth-corners"),
+    ],
+)
+def test_a_grip_bears_a_load_if_lines_between_contacts_are_in_the_friction_cones(
+    scene, turn, friction, bears
+):
+    """Two corners of a turned square are 45 degrees - turn beside the normals."""
+    model = scene[0]
+    was = model.geom_friction.copy()
+    model.geom_friction[:, 0] = friction
+    hand, cube = grip_turned(scene, turn)
+    model.geom_friction[:] = was
+    assert hand.grasps(cube.geoms)
+    assert hand.bears(cube.geoms, 0.1) == bears
+
+
+def test_a_grip_bears_less_than_its_friction_and_no_more(scene):
+    model, data, _ = scene
+    hand, cube = grip(scene, 0.0195)
+    force, total = np.zeros(6), 0.0
+    for k, pair in enumerate(pairs_in_contact(data)):
+        if not cube.geoms.isdisjoint(pair):
+            mujoco.mj_contactForce(model, data, k, force)
+            total += force[0]
+    mu = max(model.geom_friction[g, 0] for g in cube.geoms)
+    assert total > 1.0
+    assert hand.bears(cube.geoms, 0.5 * mu * total)
+    assert not hand.bears(cube.geoms, 1.01 * mu * total)
+
+
+def test_a_finger_on_one_side_bears_nothing(scene):
+    hand, cube = grip(scene, 0.04, aside=(0.0, 0.0205))
+    assert not hand.bears(cube.geoms, 0.01)
+
+
+def test_spin_is_the_angular_speed_in_the_frame_of_the_hand(scene):
+    model, data, _ = scene
+    hand, cube = grip(scene, 0.0195)
+    data.joint("cube_joint").qvel[3:] = 0.0, 2.0, 0.0
+    mujoco.mj_forward(model, data)
+    assert hand.spin(cube.body) == pytest.approx(2.0)
+    data.qvel[:] = 0.0
+    data.joint("robot0_panda_joint7").qvel[0] = -0.5
+    mujoco.mj_forward(model, data)
+    assert hand.spin(cube.body) == pytest.approx(0.5)
+    data.qvel[:] = 0.0
+    mujoco.mj_forward(model, data)

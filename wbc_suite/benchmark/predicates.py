@@ -10,11 +10,14 @@ import mujoco
 import numpy as np
 
 from wbc_suite.scene.objects import ObjectState
-from wbc_suite.sensing.hands import Hand, pairs_in_contact
+from wbc_suite.sensing.hands import Hand, bear, pairs_in_contact
 from wbc_suite.typing import Matrix, Vector
 
 GRIP_ANGLE = math.radians(120.0)
-SLIP = 0.2  # m/s, between a hand and what it holds, at most
+SLIP, SPIN = 0.2, 1.0  # m/s and rad/s, between a hand and what it holds, at most
+LOAD, PART = 1.2, 0.1
+"""What hands must be able to bear to hold a thing, and each of several, in weights of
+it: some that they could only just bear are lost (benchmarks/two_sided.py)."""
 BALANCE = 1e-3
 """Distance of a centre of mass from the area of its support, at most, m."""
 UPWARD = 0.1
@@ -31,7 +34,7 @@ class Predicates:
         states: The objects, by name.
         hands: The hands of all robots.
         robot_geoms: The geoms of all robots.
-        grip_angle: Least angle between the sides from which links clamp, rad.
+        grip_angle: Least angle between the sides from which two links clamp, rad.
     """
 
     def __init__(
@@ -84,12 +87,28 @@ class Predicates:
     def holds(self, hand: Hand, name: str, geoms: Collection[int]) -> bool:
         """Whether a hand clamps geoms of an object, which moves with it.
 
-        Its friction must bear half of the weight at least; two hands may share that.
+        It can bear the weight then, whichever way that pulls.
         """
-        body, clamps = self.states[name].body, hand.clamps(geoms, self.grip_angle)
-        if not clamps or hand.slip(body) >= SLIP:
-            return False
-        return hand.friction(geoms) > 0.5 * self.states[name].weight
+        load = LOAD * self.states[name].weight
+        return self._moves_with(hand, name, geoms) and hand.bears(geoms, load)
+
+    def hold_together(self, name: str) -> bool:
+        """Whether all hands clamp an object, which moves with them.
+
+        Together they can bear its weight, and each a part of that.
+        """
+        state = self.states[name]
+        return all(
+            self._moves_with(hand, name, state.geoms)
+            and hand.bears(state.geoms, PART * state.weight)
+            for hand in self.hands
+        ) and bear(self.hands, state.geoms, LOAD * state.weight)
+
+    def _moves_with(self, hand: Hand, name: str, geoms: Collection[int]) -> bool:
+        """Whether an object moves with a hand, whose links touch it from two sides."""
+        body = self.states[name].body
+        moves = hand.slip(body) < SLIP and hand.spin(body) < SPIN
+        return moves and hand.clamps(geoms, self.grip_angle)
 
     def supported(self, name: str) -> bool:
         """Whether contacts bear an object, which stands on them or hangs from them.

@@ -129,12 +129,8 @@ class TwoArmLift(ObjectBenchmark):
 
     def success(self) -> bool:
         """Whether the pot is level, above `lift_height`, and clamped by both hands."""
-        geoms = self.states[POT].geoms
-        return (
-            self.height > self.config.reward.lift_height
-            and self.level
-            and all(self.scene.holds(hand, POT, geoms) for hand in self.hands)
-        )
+        high = self.height > self.config.reward.lift_height
+        return high and self.level and self.scene.hold_together(POT)
 
     def progress(self) -> float:
         """Return the shaped reward.

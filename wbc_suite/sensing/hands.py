@@ -1,14 +1,22 @@
 """Hands of a robot in a scene: positions and grasps."""
 
 import itertools
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import mujoco
 import numpy as np
 
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
+
+_ANGLES = np.arange(8) * np.pi / 4
+EDGES = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+"""Directions of the edges of the pyramids inside the friction cones."""
+ARM = 0.03
+"""Length by which moments are divided to be compared with forces, m."""
+BALANCED = 1e-9
+"""Residual of balanced wrenches, as a share of the normal forces."""
 
 
 def pairs_in_contact(data: mujoco.MjData) -> list[list[int]]:
@@ -56,7 +64,11 @@ class Hand:
         return len(touching - {None}) >= 2
 
     def clamps(self, geoms: Collection[int], angle: float) -> bool:
-        """Whether two links touch an object from sides at least an angle apart, rad."""
+        """Whether links touch an object from opposite sides.
+
+        These are two, the normals of whose contacts are at least an angle apart, rad,
+        or three: what those can hold depends on more than two normals, see `bear`.
+        """
         touching: list[tuple[int, Vector]] = []
         for pair, frame in zip(
             pairs_in_contact(self._data), self._data.contact.frame, strict=True
@@ -64,22 +76,34 @@ class Hand:
             for own, other, side in ((*pair, 1.0), (*pair[::-1], -1.0)):
                 if own in self._body_of and other in geoms:
                     touching.append((self._body_of[own], side * frame[:3]))
-        return any(
+        return len({link for link, _ in touching}) > 2 or any(
             a != b and float(n @ m) < np.cos(angle)
             for (a, n), (b, m) in itertools.combinations(touching, 2)
         )
 
-    def friction(self, geoms: Collection[int]) -> float:
-        """Return the friction that the gripper can exert on an object, N.
+    def bears(self, geoms: Collection[int], load: float) -> bool:
+        """Whether its grip of an object can bear a load, N, in any direction."""
+        return bear([self], geoms, load)
 
-        It is the sum of mu F_n over their contacts.
+    def contacts(self, geoms: Collection[int]) -> list[tuple[Vector, Matrix, float]]:
+        """Return contacts with an object: points, edges of friction cones, forces.
+
+        Points are in m, normal forces in N; edges have shape (8, 3).
         """
-        most, force = 0.0, np.zeros(6)
-        for k, (a, b) in enumerate(pairs_in_contact(self._data)):
-            if (self.owns(a) and b in geoms) or (self.owns(b) and a in geoms):
-                mujoco.mj_contactForce(self._model, self._data, k, force)
-                most += self._data.contact.friction.item(k, 0) * force.item(0)
-        return most
+        data, found, force = (
+            self._data,
+            list[tuple[Vector, Matrix, float]](),
+            np.zeros(6),
+        )
+        for k, (a, b) in enumerate(pairs_in_contact(data)):
+            side = (b in geoms and self.owns(a)) - (a in geoms and self.owns(b))
+            if not side:
+                continue
+            mujoco.mj_contactForce(self._model, data, k, force)
+            normal, *tangents = side * data.contact.frame[k].reshape(3, 3)
+            cone = normal + data.contact.friction[k, :2] * EDGES @ np.array(tangents)
+            found.append((data.contact.pos[k], cone, force.item(0)))
+        return found
 
     def slip(self, body: int) -> float:
         """Return the speed of a body's centre of mass relative to the hand, m/s.
@@ -87,12 +111,55 @@ class Hand:
         With v and w the hand's velocities at its frame p, it is |v_b - v - w x (b - p)|
         for a centre b.
         """
+        hand, other = self._velocities(body)
+        turned = np.cross(hand[:3], self._data.xipos[body] - self.position)
+        return float(np.linalg.norm(other[3:] - hand[3:] - turned))
+
+    def spin(self, body: int) -> float:
+        """Return the angular speed of a body relative to the hand, rad/s."""
+        hand, other = self._velocities(body)
+        return float(np.linalg.norm(other[:3] - hand[:3]))
+
+    def _velocities(self, body: int) -> Matrix:
+        """Return angular and linear velocities of hand and body, world axes. A view."""
         model, data, kinds = self._model, self._data, mujoco.mjtObj
         hand, other = self._twists
         mujoco.mj_objectVelocity(model, data, kinds.mjOBJ_SITE, self.site, hand, 0)
         mujoco.mj_objectVelocity(model, data, kinds.mjOBJ_BODY, body, other, 0)
-        turned = np.cross(hand[:3], data.xipos[body] - self.position)
-        return float(np.linalg.norm(other[3:] - hand[3:] - turned))
+        return self._twists
+
+
+def bear(hands: Iterable[Hand], geoms: Collection[int], load: float) -> bool:
+    """Whether hands can together bear a load at an object in any direction, N.
+
+    They can if forces in the friction cones of their contacts balance the load, whose
+    normal parts sum to no more than now. With p_k and e_k the point and the edges of
+    the cones, c the middle of the contacts and d each of +-x, +-y, +-z,
+
+        sum l_k e_k = -load d,  sum l_k (p_k - c) x e_k = 0,
+        l_k >= 0,  sum l_k <= sum F_n
+
+    has a solution. The load acts at the middle of the contacts: the object may swing.
+
+    Source: Ferrari and Canny (1992), "Planning Optimal Grasps", ICRA.
+    """
+    from scipy.optimize import nnls  # takes 0.1 s to import
+
+    contacts = [contact for hand in hands for contact in hand.contacts(geoms)]
+    total = sum(force for *_, force in contacts)
+    if total <= 0.0:
+        return False
+    middle = sum(point * force for point, _, force in contacts) / total
+    edges = np.vstack([cone for _, cone, _ in contacts])
+    arms = np.repeat([point - middle for point, *_ in contacts], len(EDGES), axis=0)
+    A = np.ones((7, len(edges) + 1))
+    A[:3, :-1], A[3:6, :-1] = edges.T, np.cross(arms, edges).T / ARM
+    A[:6, -1] = 0.0
+    for way in (*np.eye(3), *-np.eye(3)):
+        wanted = np.array([*(load / total * way), 0.0, 0.0, 0.0, 1.0])
+        if nnls(A, wanted)[1] > BALANCED:
+            return False
+    return True
 
 
 def hands_of(state: RobotState) -> tuple[Hand, ...]:
