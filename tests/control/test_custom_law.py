@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from wbc_suite.compiling import compiled
-from wbc_suite.control.law.custom import LAWS, law_kernel, law_kind, register_law
 from wbc_suite.control.law.joint_laws import JointLaw
-from wbc_suite.control.law.law import Law
+from wbc_suite.control.law.law import LAWS, Law, law_kernel, law_kind, register_law
 from wbc_suite.control.loop.kernels import bind_kernels
 from wbc_suite.control.loop.records import LawKind
 from wbc_suite.envs import Simulation

@@ -10,7 +10,7 @@ found; motors that saturate. The controller then finishes the tick, see
 """
 
 from enum import IntEnum
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,12 +32,12 @@ from wbc_suite.control.composite.progress import (
 )
 from wbc_suite.control.composite.scene_obstacles import SceneArrays, measure_obstacles
 from wbc_suite.control.composite.torque_limiter import TorqueArrays, motors_suffice
-from wbc_suite.control.law.reference import set_reference
-from wbc_suite.control.loop.records import CompiledRecords, Records
+from wbc_suite.control.law.law import set_reference
+from wbc_suite.control.loop.records import Drives, Laws
 from wbc_suite.control.part.spline_reference import SplineArrays, extend_spline
 from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.qp.tick import TickArrays, TickStatus, solve_tick
-from wbc_suite.typing import Indices, Vector
+from wbc_suite.typing import Indices, Records, Vector
 
 _FIRST_LEVEL: int = np.int64(0)  # pyright: ignore[reportAssignmentType]
 """Typed, since a literal would be compiled once more."""
@@ -102,18 +102,13 @@ class WholeBodyArrays(NamedTuple):
     steps: int
 
 
-Ticks: TypeAlias = Any
-"""A tuple of `WholeBodyArrays`, one for each robot whose ticks the loop runs; None
-without any, which leaves them out of the machine code."""
-
-
 @inner
 def run_tick(
     tick: WholeBodyArrays,
     qpos: Vector,
     qvel: Vector,
-    laws: CompiledRecords,
-    drives: CompiledRecords,
+    laws: Laws,
+    drives: Drives,
 ) -> bool:
     """Run a tick as far as it needs no Python; return whether it is done.
 

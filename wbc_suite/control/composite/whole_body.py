@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite import logs
-from wbc_suite.compiling import as_argument
+from wbc_suite.compiling import readable
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.backend import IkBackend, IkStep
 from wbc_suite.control.composite.command_lead import MAX_LEAD
@@ -34,7 +34,6 @@ from wbc_suite.control.dynamics.arrays import Tracked
 from wbc_suite.control.dynamics.standing import Standing
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law
-from wbc_suite.control.loop.records import readable
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.feasible_acceleration import greatest_leads
 from wbc_suite.control.part.gripper import GripperController
@@ -63,8 +62,8 @@ class WholeBodyIK:
 
     Solves at `solve_hz` on the commanded configuration, which it integrates; the joint
     law tracks it, interpolated to the physics step. A free root is commanded too.
-    The control loop runs ticks itself, see `loop_tick`; what has no kernel is evaluated
-    in Python in between. The config is plain data of a `WholeBodyIKConfig`.
+    The control loop runs ticks itself, see `loop_ticks`; what has no kernel is
+    evaluated in Python in between. The config is plain data of a `WholeBodyIKConfig`.
 
     Attributes:
         layout: Slices of the action: controlled frames, then grippers.
@@ -262,11 +261,11 @@ class WholeBodyIK:
         self._follow_waypoint(self._planner.next(self._answer.v))
         return self._steps_per_solve
 
-    def loop_tick(self) -> WholeBodyArrays | None:
-        """Return the tick for the control loop, or None where mink solves it."""
+    def loop_ticks(self) -> tuple[WholeBodyArrays, ...]:
+        """Return the tick for the control loop, or none where mink solves it."""
         backend = self._backend
         if not isinstance(backend, StackBackend):
-            return None
+            return ()
         levels = backend.task_levels
         rows = [int((levels[:k] == levels[k]).sum()) for k in range(len(levels) - 1)]
         tick = WholeBodyArrays(
@@ -287,7 +286,7 @@ class WholeBodyIK:
             joint_law=self._law.index,
             steps=self._steps_per_solve,
         )
-        return as_argument(tick)
+        return (tick,)
 
     def finish_tick(self) -> None:
         """Finish a tick that the control loop has begun, if there is one."""
