@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import inner, struct
+from wbc_suite.compiling import Record, inner, struct
 from wbc_suite.control.composite.command_lead import limit_steps
 from wbc_suite.control.composite.finger_capsules import FingerArrays, place_fingers
 from wbc_suite.control.composite.frame_goals import GoalArrays, place_goals
@@ -56,16 +56,19 @@ class TickStage(IntEnum):
     DONE_IN_PYTHON = 4
 
 
-TICK = np.dtype(
-    [
-        ("stage", "i8"),  # `TickStage`
-        ("event", "i8"),  # `Event` of the planner
-        ("status", "i8"),  # `TickStatus` of the QP
-        ("level", "i8"),  # at which it ended
-        ("countdown", "i8"),  # physics steps until the next tick
-    ]
-)
-"""State of a tick."""
+class TickState(Record):
+    """State of a tick."""
+
+    stage: int
+    """`TickStage`."""
+    event: int
+    """`Event` of the planner."""
+    status: int
+    """`TickStatus` of the QP."""
+    level: int
+    """At which it ended."""
+    countdown: int
+    """Physics steps until the next tick."""
 
 
 @struct
@@ -73,7 +76,7 @@ class WholeBodyArrays(NamedTuple):
     """What a tick reads and writes.
 
     Attributes:
-        state: `TICK` record, shape (1,).
+        state: `TickState`, shape (1,).
         qp: The stack of tasks; its robot is at the commanded configuration.
         task_level: Strict level of the task of each frame, shape (n,).
         task_row: Place of the task on its level, shape (n,).
@@ -112,8 +115,8 @@ def run_tick(
 ) -> bool:
     """Run a tick as far as it needs no Python; return whether it is done.
 
-    See `TickStage` where it is not. `qpos` and `qvel` are measured in the simulation, laws
-    and drives are the records of the loop.
+    See `TickStage` where it is not. `qpos` and `qvel` are measured in the simulation,
+    laws and drives are the records of the loop.
     """
     state, qp, robot = tick.state[0], tick.qp, tick.qp.robot
     law = tick.joint_law

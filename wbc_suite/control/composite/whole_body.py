@@ -7,7 +7,6 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite import logs
-from wbc_suite.compiling import readable
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.backend import IkBackend
 from wbc_suite.control.composite.command_lead import MAX_LEAD
@@ -24,7 +23,7 @@ from wbc_suite.control.composite.reduced_robot import (
 )
 from wbc_suite.control.composite.scene_obstacles import SceneObstacles
 from wbc_suite.control.composite.stack_backend import StackBackend
-from wbc_suite.control.composite.tick import TICK, TickStage, WholeBodyArrays
+from wbc_suite.control.composite.tick import TickStage, TickState, WholeBodyArrays
 from wbc_suite.control.composite.waypoint_planner import Waypoint, WaypointPlanner
 from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
@@ -114,7 +113,7 @@ class WholeBodyIK:
             self._backend.self_collision,
         )
         self._make_laws(state, float(limits.max()))
-        self._state = readable(np.zeros(1, TICK))
+        self._state = TickState.zeros()
         feet = {self.robot.link_of(held.frame) for held in self.config.held}
         self._report = IkReport(
             self.config, Configuration(model), self._conversion, feet
