@@ -93,17 +93,14 @@ class Simulation:
         """Return what the loop reads and writes."""
         model, data = self.model, self.data
         self._ticked = [c for c in self.controllers if isinstance(c, TickedController)]
-        own = {
-            k: c.loop_ticks()
-            for k, c in enumerate(self.controllers)
-            if isinstance(c, TickedController)
-        }
-        ticks = [tick for found in own.values() for tick in found]
-        self._prepared = [
-            (k, state, controller)
-            for k, (state, controller) in enumerate(self.pairs)
-            if not any(isinstance(x, WholeBodyArrays) for x in own.get(k, ()))
-        ]
+        ticks: list[WholeBodyArrays | HandIk] = []
+        self._prepared: list[tuple[int, RobotState, CompositeController]] = []
+        for k, (state, controller) in enumerate(self.pairs):
+            is_ticked = isinstance(controller, TickedController)
+            own = controller.loop_ticks() if is_ticked else ()
+            ticks += own
+            if not any(isinstance(tick, WholeBodyArrays) for tick in own):
+                self._prepared.append((k, state, controller))
         exact = all(solver.sensors.is_exact for solver in self._dynamic)
         believed = data if exact else mujoco.MjData(model)
         self._sources = [
@@ -216,6 +213,8 @@ class Simulation:
                 override=self._override,
             )
             self.loop_arguments = loop, kernels
+            if self._runs_plain:
+                self._plain_advance = plain(advance)
             self._needed = needed
 
     def _call_loop(self, steps: int) -> int:
@@ -223,10 +222,11 @@ class Simulation:
         self._bind_kernels()
         done = -1
         if math.isfinite(self.data.time):
-            run = plain(advance) if self._runs_plain else advance
+            run = self._plain_advance if self._runs_plain else advance
             done = run(*self.loop_arguments, steps=steps)
         if self._override is not None and self._override.error is not None:
-            raise self._override.error
+            error, self._override.error = self._override.error, None
+            raise error
         if done < 0:
             self._watch.check()
         return done

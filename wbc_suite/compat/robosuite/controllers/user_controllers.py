@@ -14,6 +14,7 @@ from wbc_suite.control import RobotState
 from wbc_suite.control.composite.basic import BasicController, default_basic_config
 from wbc_suite.control.composite.registry import register_composite
 from wbc_suite.control.memory import Parts
+from wbc_suite.control.part.ik_tick import HandIk
 from wbc_suite.typing import Vector
 
 REGISTERED_COMPOSITE_CONTROLLERS_DICT: dict[str, type["CompositeController"]] = {}
@@ -233,6 +234,12 @@ class _Adapter:
 
     def prepare(self, state: RobotState) -> int:
         return self._inner.prepare(state)
+
+    def loop_ticks(self) -> tuple[HandIk, ...]:
+        return self._inner.loop_ticks()
+
+    def finish_tick(self) -> None:
+        self._inner.finish_tick()
 
     def compute(self, state: RobotState) -> Vector:
         """Return the user's commands; see `SteppedController`."""
