@@ -1,5 +1,6 @@
 """IK_POSE: actions are poses of the hand; inverse kinematics gives joint references."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -17,14 +18,14 @@ from wbc_suite.control.part.ik_tick import HandIk, HandState
 from wbc_suite.control.part.part_settings import (
     REACH,
     ROUNDING,
-    InputScaling,
     Numbers,
     PartSettings,
+    SliceInput,
     apply_torque_settings,
     damping_of,
 )
 from wbc_suite.control.part.spline_reference import SplineReference, window_length
-from wbc_suite.control.poses import pose_vector, row_of, vector_pose
+from wbc_suite.control.poses import row_of, vector_pose
 from wbc_suite.control.reasons import LazyReasons, Reason
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
@@ -118,7 +119,7 @@ class IkPoseController(PartController[JointLaw]):
     ) -> None:
         assert part.hand is not None
         self.config, self._state, self._hand = config, state, part.hand
-        self._site = state.model.site(state.prefix + part.hand).id
+        site = state.model.site(state.prefix + part.hand).id
         kd = damping_of(config.kp, config.damping_ratio)
         self.law = JointLaw(state, part.joints, kp=config.kp, kd=kd)
         apply_torque_settings(self.law, config)
@@ -126,8 +127,23 @@ class IkPoseController(PartController[JointLaw]):
         self._base = state.model.body(state.prefix + state.robot.links[0].name).id
         if config.input_ref_frame == "world":
             self._base = 0
-        self._scaling = InputScaling(3, config, config.output_min, config.output_max)
-        self.slices = (_pose_part(part.name, config, self._scaling),)
+        data = state.data
+        self._frames = (
+            data.xmat[self._base].reshape(3, 3),
+            data.xpos[self._base],
+            data.site_xmat[site].reshape(3, 3),
+            data.site_xpos[site],
+        )
+        self._input = SliceInput(
+            part.name,
+            SliceKind.POSE,
+            labels=AXES[:3],
+            units=(Unit("m"),) * 3,
+            config=config,
+            outputs=(config.output_min, config.output_max),
+            limits=(np.full(3, -REACH), np.full(3, REACH)),
+        )
+        self.slices = (_with_quaternion(self._input.action),)
         self._goal = HandGoal(config)
         self._tick = HandState.zeros()
         self._make_stack(part)
@@ -238,7 +254,7 @@ class IkPoseController(PartController[JointLaw]):
         self._rest[:] = self._configuration.q
         self._posture.set_target(self._rest)
         self._spline.reset()
-        self._goal.reset(pose_vector(self._hand_pose()))
+        self._goal.reset(relative_pose(*self._frames))
         self.law.aim(q)
         self._tick["status"], self._tick["countdown"] = TickStatus.SOLVED, 0
 
@@ -254,14 +270,14 @@ class IkPoseController(PartController[JointLaw]):
         rotation = np.zeros(3) if turn is None else pin.log3(turn)
         angle = float(np.linalg.norm(rotation))
         rotation = rotation * min(1.0, self.config.turn_limit / max(angle, ROUNDING))
-        step = np.concatenate([self._scaling(values[:3]), rotation])
-        self._goal.step(step, pose_vector(self._hand_pose()))
+        step = np.concatenate([self._input.scaling(values[:3]), rotation])
+        self._goal.step(step, relative_pose(*self._frames))
 
     @property
     def hold_action(self) -> Vector:
         """The action that keeps the goal."""
         if self.config.input_type == "delta":
-            return np.concatenate([self._scaling.neutral, [0.0, 0.0, 0.0, 1.0]])
+            return np.concatenate([self._input.neutral, [0.0, 0.0, 0.0, 1.0]])
         return pin.SE3ToXYZQUAT(self.goal)
 
     def report(self, state: RobotState) -> dict[str, Any]:
@@ -269,7 +285,7 @@ class IkPoseController(PartController[JointLaw]):
 
         The keys are those of a `TaskReport`.
         """
-        error = self._hand_pose().actInv(self.goal)
+        error = vector_pose(relative_pose(*self._frames)).actInv(self.goal)
         position = float(np.linalg.norm(error.translation))
         angle = float(np.linalg.norm(pin.log3(error.rotation)))
         linear, angular = self.config.tolerance
@@ -286,38 +302,21 @@ class IkPoseController(PartController[JointLaw]):
         """Return why the hand is not at its goal; computed when first read."""
         in_loop = self._tick["status"][0] == TickStatus.SOLVED
         record = self._stack.solution().record if in_loop else self._stack.record()
-        return LazyReasons(partial(_reasons, record, self._hand))
-
-    def _hand_pose(self) -> pin.SE3:
-        """Return the measured pose of the hand in the goals' axes."""
-        data, base, site = self._state.data, self._base, self._site
-        return vector_pose(
-            relative_pose(
-                data.xmat[base].reshape(3, 3),
-                data.xpos[base],
-                data.site_xmat[site].reshape(3, 3),
-                data.site_xpos[site],
-            )
-        )
+        return LazyReasons(partial(_explain, record, self._hand))
 
 
-def _pose_part(name: str, config: IkPoseConfig, scaling: InputScaling) -> ActionPart:
-    """Return the action slice: x y z, and a quaternion."""
-    units, high = (Unit("m"),) * 3, np.full(3, REACH)
-    low = -high
-    if config.input_type == "delta":
-        low, high, units = scaling.low, scaling.high, scaling.units(units)
-    return ActionPart(
-        name=name,
-        kind=SliceKind.POSE,
+def _with_quaternion(position: ActionPart) -> ActionPart:
+    """Return the slice of a position with a quaternion after it."""
+    return replace(
+        position,
         labels=AXES,
-        units=(*units, *(Unit("quaternion"),) * 4),
-        low=(*low.tolist(), *(-1.0,) * 4),
-        high=(*high.tolist(), *(1.0,) * 4),
+        units=(*position.units, *(Unit("quaternion"),) * 4),
+        low=(*position.low, *(-1.0,) * 4),
+        high=(*position.high, *(1.0,) * 4),
         wraps=True,
     )
 
 
-def _reasons(record: TickRecord, hand: str) -> tuple[Reason, ...]:
+def _explain(record: TickRecord, hand: str) -> tuple[Reason, ...]:
     reports = record.explain(position_tolerance=0.0, orientation_tolerance=0.0)
     return reports[hand].reasons if hand in reports else ()
