@@ -125,9 +125,9 @@ def test_joint_limits_hold_for_a_registered_law(alone):
 def test_kernels_are_bound_again_only_where_laws_change(alone, monkeypatch):
     robot, bound = alone("Panda", "BASIC"), []
 
-    def bind(laws, *arguments, **named):
-        bound.append(laws["kind"].tolist())
-        return bind_kernels(laws, *arguments, **named)
+    def bind(loop, **named):
+        bound.append(loop.laws["kind"].tolist())
+        return bind_kernels(loop, **named)
 
     monkeypatch.setattr("wbc_suite.envs.simulation.bind_kernels", bind)
     state = robot.state
