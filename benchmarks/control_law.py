@@ -18,13 +18,12 @@ from harness.stand import Stand, arms_config
 
 import mujoco  # isort: skip  (after harness: it sets the number of threads)
 import numba
-import numpy as np
 
-from wbc_suite.compiling import as_argument, plain
+from wbc_suite.compiling import plain
+from wbc_suite.control.loop.data import LoopData, loop_data
 from wbc_suite.control.loop.inverse_dynamics import write_commands
 from wbc_suite.control.loop.kernels import LoopKernels, bind_kernels
-from wbc_suite.control.loop.physics import Physics, bind_physics
-from wbc_suite.control.loop.records import Records, gather
+from wbc_suite.control.loop.records import gather
 
 ROBOTS = ("Panda", "Sawyer", "UR5e", "Baxter", "Tiago", "GR1")
 KINDS = ("OSC_POSE", "OSC_POSITION")
@@ -36,16 +35,10 @@ clock = time.thread_time_ns
 
 
 @numba.njit(nogil=True)
-def control_only(
-    physics: Physics,
-    laws: Records,
-    drives: Records,
-    kernels: LoopKernels,
-    steps: int,
-) -> None:
+def control_only(loop: LoopData, kernels: LoopKernels, steps: int) -> None:
     """Compute the control of one instant again and again."""
     for _ in range(steps):
-        write_commands(physics, laws, drives, kernels, None)
+        write_commands(loop, kernels)
 
 
 class Law:
@@ -55,19 +48,17 @@ class Law:
         self.stand = Stand(robot, arms_config(robot, kind))
         self.stand.reset()
         stand = self.stand
-        self.physics = bind_physics(stand.model, stand.data)
         pieces = [(law.record, law.drives) for law in stand.controller.laws]
-        self.argument, self.records = as_argument(self.physics), gather(pieces)
-        self.kernels, self.owner = bind_kernels(self.records[0], self.argument)
+        self.data = loop_data(stand.model, stand.data, *gather(pieces))
+        self.loop, self.kernels, self.owner = bind_kernels(self.data)
         mujoco.mj_step1(stand.model, stand.data)
 
     def plain(self, steps: int) -> None:
         """Compute the control of one instant again and again, in plain Python."""
         write = plain(write_commands)
-        laws, drives = (records.view(np.recarray) for records in self.records)
-        kernels, _ = bind_kernels(laws, self.physics, compiled=False)
+        loop, kernels, _ = bind_kernels(self.data, compiled=False)
         for _ in range(steps):
-            write(self.physics, laws, drives, kernels, None)
+            write(loop, kernels)
 
     def run(self, blocks: int) -> dict[str, list[float]]:
         """Return times of one step by side, us."""
@@ -89,7 +80,7 @@ class Law:
         return found
 
     def _kernel(self, steps: int) -> None:
-        control_only(self.argument, *self.records, self.kernels, steps)
+        control_only(self.loop, self.kernels, steps)
 
     def _physics(self, steps: int) -> None:
         mujoco.mj_step(self.stand.model, self.stand.data, steps)

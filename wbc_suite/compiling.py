@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 from types import FunctionType
-from typing import Any, TypeVar, cast
+from typing import Any, ClassVar, TypeVar, cast, get_args, get_type_hints
 
 import numba
 import numpy as np
@@ -114,15 +114,24 @@ class Callback(types.WrapperAddressProtocol):
     """A Python function without arguments, as a value that kernels call.
 
     It runs with the interpreter's lock, whether or not its caller has it, and has to
-    live as long as the `struct`. What it raises is printed, and ignored.
+    live as long as the `struct`. Kernels get whether it returned; what it raised is
+    `error`.
     """
 
-    def __init__(self, function: Callable[[], None]) -> None:
-        self._entry = ctypes.CFUNCTYPE(None)(function)
+    error: Exception | None = None
 
-    def __call__(self) -> None:
-        """Call the function."""
-        self._entry()
+    def __init__(self, function: Callable[[], None]) -> None:
+        self._function = function
+        self._entry = ctypes.CFUNCTYPE(ctypes.c_bool)(self)
+
+    def __call__(self) -> bool:
+        """Call the function; return whether it returned."""
+        self.error = None
+        try:
+            self._function()
+        except Exception as error:  # noqa: BLE001, no exception passes machine code
+            self.error = error
+        return self.error is None
 
     def __wrapper_address__(self) -> int:
         """Return the address of the machine code."""
@@ -130,7 +139,7 @@ class Callback(types.WrapperAddressProtocol):
 
     def signature(self) -> Any:
         """Return numba's signature."""
-        return types.void()
+        return types.boolean()
 
 
 _RESULTS: dict[str, Any] = {
@@ -158,19 +167,66 @@ def is_compiling() -> bool:
     return not _numba.DISABLE_JIT
 
 
-def readable(records: Records) -> Records:
-    """Return records whose fields plain Python reads as kernels do, if it has to."""
-    return records if is_compiling() else records.view(np.recarray)
+def external(function: Any, signature: Any) -> Any:
+    """Return a C function of a loaded library for kernels.
+
+    In plain Python it is `function`, which has its name.
+    """
+    symbol = types.ExternalFunction(function.__name__, signature)
+    _EXTERNAL.append((symbol, function))
+    return symbol
+
+
+_EXTERNAL: list[tuple[Any, Any]] = []
+"""C functions that kernels call, with their Python forms."""
 
 
 def plain(kernel: Any) -> Any:
-    """Return a kernel, and all kernels that it calls, as plain Python functions."""
+    """Return a kernel, and all functions that it calls, as plain Python functions."""
     function = getattr(kernel, "py_func", None) or inspect.unwrap(kernel)
     names = dict(function.__globals__)
     for name in set(function.__code__.co_names) & set(names):
-        if any(names[name] is kernel for kernel in (*_KERNELS, *_INNER)):
-            names[name] = plain(names[name])
+        called = names[name]
+        if any(called is kernel for kernel in (*_KERNELS, *_INNER)):
+            names[name] = plain(called)
+        for symbol, form in _EXTERNAL:
+            if called is symbol:
+                names[name] = form
     return FunctionType(function.__code__, names, function.__name__)
+
+
+class Record:
+    """Numbers that kernels read and write by name, in rows of a structured array.
+
+    A subclass declares them: fields of type int, float or `Annotated[Vector, size]`,
+    each with its unit in the line below. Its objects stand for one row.
+
+    Attributes:
+        dtype: The type of its arrays.
+    """
+
+    dtype: ClassVar[np.dtype[np.void]]
+
+    def __init_subclass__(cls) -> None:
+        hints = get_type_hints(cls, include_extras=True)
+        hints.pop("dtype")
+        cls.dtype = np.dtype(
+            [(name, *_field_type(hint)) for name, hint in hints.items()]
+        )
+
+    @classmethod
+    def zeros(cls, count: int = 1) -> Records:
+        """Return records that are all zero, shape (count,)."""
+        return readable(np.zeros(count, cls.dtype))
+
+
+def _field_type(hint: Any) -> tuple[Any, ...]:
+    return {int: ("i8",), float: ("f8",)}.get(hint) or ("f8", get_args(hint)[1:])
+
+
+def readable(records: Records) -> Records:
+    """Return records whose fields plain Python reads as kernels do; a view."""
+    return records.view(np.recarray)
 
 
 def struct(fields: type[Fields]) -> type[Fields]:
@@ -208,14 +264,15 @@ def struct(fields: type[Fields]) -> type[Fields]:
 def as_argument(values: Fields) -> Fields:
     """Return the argument of a kernel that stands for a tuple of a `struct` class.
 
-    Arrays are shared, numbers are copied; fields that are such tuples are converted
-    too. Without compilation it is the tuple itself.
+    Arrays are shared, numbers are copied; fields that are such tuples, or plain tuples
+    of them, are converted too. Without compilation it is the tuple itself.
     """
-    if _numba.DISABLE_JIT:
-        return values
-    fields = [as_argument(x) if hasattr(x, "pack") else x for x in values]
     kind: Any = type(values)
-    return kind.pack(kind(*fields))
+    pack: Any = getattr(kind, "pack", None)
+    if _numba.DISABLE_JIT or not (pack or kind is tuple):
+        return values
+    fields: Any = tuple(map(as_argument, values))
+    return pack(kind(*fields)) if pack else fields
 
 
 class _StructType(types.StructRef):

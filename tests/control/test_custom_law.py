@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from wbc_suite.compiling import compiled
-from wbc_suite.control.law.custom import LAWS, law_kernel, law_kind, register_law
 from wbc_suite.control.law.joint_laws import JointLaw
-from wbc_suite.control.law.law import Law
+from wbc_suite.control.law.law import LAWS, Law, law_kernel, law_kind, register_law
 from wbc_suite.control.loop.kernels import bind_kernels
 from wbc_suite.control.loop.records import LawKind
 from wbc_suite.envs import Simulation
@@ -126,9 +125,9 @@ def test_joint_limits_hold_for_a_registered_law(alone):
 def test_kernels_are_bound_again_only_where_laws_change(alone, monkeypatch):
     robot, bound = alone("Panda", "BASIC"), []
 
-    def bind(laws, *arguments, **named):
-        bound.append(laws["kind"].tolist())
-        return bind_kernels(laws, *arguments, **named)
+    def bind(loop, **named):
+        bound.append(loop.laws["kind"].tolist())
+        return bind_kernels(loop, **named)
 
     monkeypatch.setattr("wbc_suite.envs.simulation.bind_kernels", bind)
     state = robot.state

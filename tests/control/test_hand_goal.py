@@ -7,9 +7,9 @@ import pinocchio as pin
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from wbc_suite.control.law.pose_interpolation import pose_vector
 from wbc_suite.control.part.hand_goal import HandGoal
 from wbc_suite.control.part.part_settings import ROUNDING
+from wbc_suite.control.poses import pose_vector
 from wbc_suite.errors import ConfigError
 
 

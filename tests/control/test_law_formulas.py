@@ -26,12 +26,12 @@ from wbc_suite.control.composite.progress import (
 from wbc_suite.control.composite.whole_body_dynamics import WholeBodyID
 from wbc_suite.control.dynamics import solve_tick, terms
 from wbc_suite.control.law import osc
-from wbc_suite.control.law.pose_interpolation import interpolate_pose, pose_vector
 from wbc_suite.control.loop import acceleration_limits as limits
 from wbc_suite.control.loop import inverse_dynamics
-from wbc_suite.control.loop.records import LAW, LawKind
+from wbc_suite.control.loop.records import LawKind, LawRecord
 from wbc_suite.control.part.joint_controllers import JointPositionController
 from wbc_suite.control.part.osc_controller import OscConfig
+from wbc_suite.control.poses import pose_vector
 
 
 def record(**fields):
@@ -295,19 +295,21 @@ def test_hands_come_last_and_keep_their_direction_where_they_are_asked_to(
 
     monkeypatch.setattr(inverse_dynamics, "is_saturated", lambda *_: saturated)
     monkeypatch.setattr(inverse_dynamics, "limit_accelerations", note("limit"))
-    laws = np.zeros(3, LAW).view(np.recarray)
+    laws = LawRecord.zeros(3)
     laws.kind = LawKind.OSC, LawKind.JOINT, LawKind.TORQUE
     laws.kernel, laws.keep_direction = (1, 2, 0), (asked, 0.0, 0.0)
     kernels = record(
+        observe_roots=note("roots"),
         observe=note("observe"),
         law=(note("none"), note("hand"), note("joints")),
         prepare=note("prepare"),
         keep_direction=note("direction"),
     )
     physics = record(acceleration=np.ones(2), timestep=0.002)
-    plain(inverse_dynamics.ask_accelerations)(physics, laws, None, kernels, None)
+    loop = record(physics=physics, laws=laws, drives=None)
+    plain(inverse_dynamics.ask_accelerations)(loop, kernels)
     kept = ["prepare", "direction"] * (saturated and asked > 0.0)
-    assert called == ["observe", "joints", "limit", "hand", *kept, "limit"]
+    assert called == ["roots", "observe", "joints", "limit", "hand", *kept, "limit"]
     np.testing.assert_array_equal(laws.since, 0.002)
     assert not physics.acceleration.any()
 
@@ -385,7 +387,7 @@ def test_the_goal_of_a_hand_moves_at_constant_velocities(since, duration, phase,
     )
     R, p, twist = np.full((3, 3), 7.0), np.full(3, 7.0), np.full(6, 7.0)
     axes, place = body.rotation.copy(), body.translation.copy()
-    plain(interpolate_pose)(law, axes, place, R, p, twist)
+    osc.interpolate_pose(law, axes, place, R, p, twist)
     moved = pin.SE3(
         start.rotation @ pin.exp3(phase * turn), start.translation + phase * shift
     )

@@ -2,10 +2,8 @@ import numpy as np
 import pytest
 from textbook_laws import observe
 
-from wbc_suite.compiling import as_argument, plain
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.loop.acceleration_limits import acceleration_limits
-from wbc_suite.control.loop.inverse_dynamics import write_commands
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.robot.mjcf_export import LONGEST_STEP, STOP_MARGIN
 
@@ -31,10 +29,7 @@ def run(panda, seconds):
 
 def as_plain_python(simulation):
     """Run the laws of a simulation without numba from now on."""
-    simulation._physics = bind_physics(simulation.model, simulation.data)
-    simulation._records = [x.view(np.recarray) for x in simulation._records]
-    simulation._write_commands = plain(write_commands)
-    simulation.compiled, simulation._runs_plain = False, True
+    simulation._runs_plain, simulation._needed = True, []
 
 
 @pytest.fixture
@@ -75,7 +70,7 @@ def test_the_window_lets_a_joint_brake_with_its_own_deceleration(panda):
     drives["position_max"] = data.qpos[drives["qpos"]] + 0.5
     drives["velocity_max"], drives["position_min"] = np.inf, -np.inf
     data.qvel[drives["dof"]] = np.sqrt(2 * 2.0 * 0.5 + (2.0 / 50) ** 2) - 2.0 / 50
-    physics = as_argument(bind_physics(panda.state.model, data))
+    physics = bind_physics(panda.state.model, data)
     limits = np.array([acceleration_limits(physics, drive) for drive in drives])
     # On the profile: b u / (u + b / r), a little less than b.
     u = data.qvel[drives["dof"]]

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 import wbc_suite
+from wbc_suite.control import BasicController, load_composite_controller_config
 from wbc_suite.control.loop.advance import advance
+from wbc_suite.envs import Simulation
 
 CASES = [
     ("Panda", "BASIC"),
     ("Panda", "WHOLE_BODY_IK"),
+    ("Panda", "IK_POSE"),
     ("Tiago", "BASIC"),
     pytest.param("Baxter", "BASIC", marks=pytest.mark.slow),
     pytest.param("GR1", "BASIC", marks=pytest.mark.slow),
@@ -75,7 +78,7 @@ def test_same_seed_gives_bit_equal_states():
     np.testing.assert_array_equal(again, first)
 
 
-@pytest.mark.parametrize("controller", ["BASIC", "WHOLE_BODY_IK"])
+@pytest.mark.parametrize("controller", ["BASIC", "IK_POSE", "WHOLE_BODY_IK"])
 def test_an_action_is_one_call(controller, monkeypatch):
     """25 steps of physics, with five solves in between at 100 Hz."""
     env = made("Panda", controller)
@@ -89,6 +92,50 @@ def test_an_action_is_one_call(controller, monkeypatch):
     monkeypatch.setattr("wbc_suite.envs.simulation.advance", count)
     env.step(env.hold_action)
     assert counted == [25]
+
+
+class Pushing(BasicController):
+    """BASIC with a torque more on the first joint, computed in Python."""
+
+    calls = 0
+
+    def compute(self, state):
+        self.calls += 1
+        commands = state.data.ctrl[state.actuator_ids]
+        if state.time > 0.02:
+            raise RuntimeError("the link to the robot is down")
+        commands[0] += 5.0
+        return commands
+
+
+def pushed(alone, *, is_compiled):
+    robot = alone("Panda", "BASIC")
+    config = load_composite_controller_config("BASIC", "Panda")
+    pairs = [(robot.state, Pushing(config, robot.state))]
+    model, data = robot.simulation.model, robot.simulation.data
+    simulation = Simulation(model, data, pairs, compiled=is_compiled)
+    simulation.start()
+    return simulation
+
+
+@pytest.mark.parametrize("is_compiled", [True, False])
+def test_commands_computed_in_python_override_those_of_laws(alone, is_compiled):
+    simulation = pushed(alone, is_compiled=is_compiled)
+    (controller,) = simulation.controllers
+    simulation.tick(10)
+    assert controller.calls == 10
+    assert not simulation.compiled
+    push = simulation.data.ctrl[0] - controller.laws[0].drives["command"][0]
+    assert push == pytest.approx(5.0, abs=1e-12)
+    assert simulation.data.qvel[0] > 0.05
+
+
+@pytest.mark.parametrize("is_compiled", [True, False])
+def test_an_error_in_commands_computed_in_python_passes_the_loop(alone, is_compiled):
+    simulation = pushed(alone, is_compiled=is_compiled)
+    with pytest.raises(RuntimeError, match="link to the robot"):
+        simulation.tick(20)
+    assert simulation.data.time == pytest.approx(0.022, abs=0.002)
 
 
 def test_positions_after_a_step_are_those_of_the_joints():

@@ -18,9 +18,8 @@ from wbc_suite.control import (
     load_part_controller_config,
     register_part_controller,
 )
-from wbc_suite.control.law.custom import LAWS, register_law
 from wbc_suite.control.law.joint_laws import JointLaw
-from wbc_suite.control.law.law import Law
+from wbc_suite.control.law.law import LAWS, Law, register_law
 from wbc_suite.control.part.registry import PART_CONTROLLERS, PartControllerName
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.tomlfile import FrozenModel

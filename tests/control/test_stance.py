@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import qpsolvers
-from textbook_laws import textbook
+from textbook_laws import textbook, write_once
 
 from wbc_suite.control import load_composite_controller_config
 from wbc_suite.control.dynamics.arrays import EDGES
@@ -43,7 +43,7 @@ def solve_once(scene):
     """Compute commands in the present state; return the robot's QP."""
     standing = scene.controller.standing
     standing.dynamics.state["stage"] = 0
-    while not scene.simulation._write_commands(*scene.simulation._law_arguments):
+    while not write_once(scene.simulation):
         standing.finish_tick()
     return standing.dynamics
 

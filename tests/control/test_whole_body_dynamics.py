@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from textbook_laws import write_once
 
 import wbc_suite
 from wbc_suite.cli.teleop import default_controller
@@ -118,9 +119,8 @@ def test_frames_have_mujocos_jacobians_and_drifts(walking):
 
 def solve_once(walker):
     """Run the law's tick once more in the present state, without physics."""
-    arguments = walker.simulation._law_arguments
     walker.body.state["stage"] = 0
-    while not walker.simulation._write_commands(*arguments):
+    while not write_once(walker.simulation):
         walker.controller.finish_tick()
 
 

@@ -10,7 +10,7 @@ from wbc_suite.control.composite.whole_body import WholeBodyIK
 def made(robot, monkeypatch, *, in_loop):
     with monkeypatch.context() as patch:
         if not in_loop:
-            patch.setattr(WholeBodyIK, "loop_tick", lambda _: None)
+            patch.setattr(WholeBodyIK, "loop_ticks", lambda _: ())
         env = make("Lift", robots=robot, controller_configs="WHOLE_BODY_IK").unwrapped
     env.reset(seed=0)
     return env

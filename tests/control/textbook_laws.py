@@ -9,9 +9,11 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.compiling import compiled, plain
 from wbc_suite.control.law.osc import LEAST_DAMPING, SINGULAR
 from wbc_suite.control.law.osc_saturation import POSTURE_COST, SHORTENING_COST
 from wbc_suite.control.loop.acceleration_limits import RATE
+from wbc_suite.control.loop.inverse_dynamics import write_commands
 from wbc_suite.control.loop.records import LawKind
 
 UNBOUNDED = 1e30
@@ -347,9 +349,20 @@ _CLASSES = {
 }
 
 
+@compiled
+def _write(loop, kernels):
+    return write_commands(loop, kernels)
+
+
+def write_once(simulation):
+    """Compute commands in the present state; return whether that is done."""
+    write = plain(write_commands) if simulation._runs_plain else _write
+    return write(*simulation.loop_arguments)
+
+
 def kernel_commands(simulation, state):
     """Return one command per actuator by the kernels."""
-    simulation._write_commands(*simulation._law_arguments)
+    write_once(simulation)
     return state.data.ctrl[state.actuator_ids].copy()
 
 

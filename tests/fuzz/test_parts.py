@@ -18,10 +18,9 @@ from wbc_suite.control import (
     load_composite_controller_config,
 )
 from wbc_suite.control.composite.protocols import solver_of_body
-from wbc_suite.control.dynamics.arrays import for_plain_python
+from wbc_suite.control.loop.data import loop_data
 from wbc_suite.control.loop.inverse_dynamics import write_commands
 from wbc_suite.control.loop.kernels import bind_kernels
-from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
 from wbc_suite.control.part.registry import PART_CONTROLLERS
 from wbc_suite.control.robot_parts import hands_of, parts_of
@@ -119,11 +118,10 @@ def write_all_commands(controller, state):
     """Compute the commands of all actuators once, in plain Python."""
     laws, drives = gather([(law.record, law.drives) for law in controller.laws])
     solver = solver_of_body(controller)
-    bodies = None if solver is None else (for_plain_python(solver.dynamics),)
-    laws, drives = laws.view(np.recarray), drives.view(np.recarray)
-    physics = bind_physics(state.model, state.data)
-    kernels, _ = bind_kernels(laws, physics, bodies, compiled=False)
-    plain(write_commands)(physics, laws, drives, kernels, bodies)
+    bodies = () if solver is None else (solver.dynamics,)
+    data = loop_data(state.model, state.data, laws, drives)._replace(bodies=bodies)
+    loop, kernels, _ = bind_kernels(data, compiled=False)
+    plain(write_commands)(loop, kernels)
 
 
 @pytest.mark.slow

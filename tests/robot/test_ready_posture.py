@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.compiling import as_argument
+from wbc_suite.compiling import compiled
 from wbc_suite.control import RobotState
 from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.loop.data import loop_data
 from wbc_suite.control.loop.inverse_dynamics import write_commands
 from wbc_suite.control.loop.kernels import bind_kernels
-from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import SelfCollisionLimit
@@ -36,6 +36,12 @@ def without_free_root(name):
     """Return a robot by name; a free root is fixed in the air."""
     robot = load_robot(name)
     return robot.with_root("fixed") if robot.root.kind == "free" else robot
+
+
+@compiled
+def write_once(loop, kernels):
+    """Write the commands of the present state."""
+    return write_commands(loop, kernels)
 
 
 class Lone:
@@ -80,14 +86,13 @@ class Lone:
         for joint in servos:
             self.data.actuator(PREFIX + joint).ctrl = self.ready[joint]
         drift = dict.fromkeys((*driven, *sorted(servos)), 0.0)
-        physics = as_argument(bind_physics(self.model, self.data))
         records = gather([(law.record, law.drives)])
         law.adopt(*records)
-        kernels, _owner = bind_kernels(records[0], physics)
-        arguments = physics, *records, kernels, None
+        data = loop_data(self.model, self.data, *records)
+        loop, kernels, _owner = bind_kernels(data)
         for _ in range(round(seconds / self.model.opt.timestep)):
             mujoco.mj_step1(self.model, self.data)
-            write_commands(*arguments)
+            write_once(loop, kernels)
             mujoco.mj_step2(self.model, self.data)
             for joint, largest in drift.items():
                 way = self.data.joint(PREFIX + joint).qpos[0] - self.ready.get(

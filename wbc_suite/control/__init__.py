@@ -27,9 +27,8 @@ from wbc_suite.control.composite.registry import (
     register_composite,
     register_config_converter,
 )
-from wbc_suite.control.law.custom import LAWS, register_law
 from wbc_suite.control.law.joint_laws import JointLaw, VelocityLaw
-from wbc_suite.control.law.law import Law, ServoLaw, TorqueLaw
+from wbc_suite.control.law.law import LAWS, Law, ServoLaw, TorqueLaw, register_law
 from wbc_suite.control.law.osc import OscLaw
 from wbc_suite.control.part.controller import PartController, PoseInput
 from wbc_suite.control.part.part_settings import PartSettings

@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
 
-from wbc_suite.compiling import as_argument, is_compiling, plain
+from wbc_suite.compiling import Callback, is_compiling, plain
 from wbc_suite.control import CompositeController, RobotState, SteppedController
 from wbc_suite.control.composite.protocols import (
     ResumableController,
@@ -15,22 +14,17 @@ from wbc_suite.control.composite.protocols import (
     solver_of_body,
 )
 from wbc_suite.control.composite.tick import WholeBodyArrays
-from wbc_suite.control.dynamics.arrays import for_plain_python
 from wbc_suite.control.dynamics.state_source import (
     begin_source,
     make_state_source,
-    read_all_sensors,
-    source_for_plain_python,
     source_memory,
-    use_all_feet,
 )
 from wbc_suite.control.loop.advance import advance
-from wbc_suite.control.loop.inverse_dynamics import write_commands
+from wbc_suite.control.loop.data import LoopData, loop_data
 from wbc_suite.control.loop.kernels import DECIDING, bind_kernels
-from wbc_suite.control.loop.mujoco_functions import addresses
-from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
 from wbc_suite.control.memory import Memory
+from wbc_suite.control.part.ik_tick import HandIk
 from wbc_suite.envs.watch import PhysicsWatch, check_laws, check_model
 from wbc_suite.typing import Vector
 
@@ -79,16 +73,34 @@ class Simulation:
         self._left = np.zeros(len(pairs), dtype=np.int64)
         self.loop_calls = 1
         self._stepped = [(r, c) for r, c in pairs if isinstance(c, SteppedController)]
-        compiled = compiled and is_compiling()
-        self.compiled = compiled and not self._stepped
+        self._override = Callback(self._compute) if self._stepped else None
+        self._runs_plain = not (compiled and is_compiling())
+        self.compiled = not (self._runs_plain or self._stepped)
         laws = [law for controller in self.controllers for law in controller.laws]
         self._laws, self._drives = gather([(law.record, law.drives) for law in laws])
         for k, law in enumerate(laws):
             first, last = self._laws["first"][k], self._laws["last"][k]
             law.adopt(self._laws[k : k + 1], self._drives[first:last], k)
-        self._ticked, ticks = self._loop_ticks()
         found = map(solver_of_body, self.controllers)
         self._dynamic = [solver for solver in found if solver is not None]
+        self._needed = list[bytes]()
+        self._loop = self._loop_data()
+        self.memory = self._make_memory()
+        self._new = self.memory.read()
+        self._call_loop(0)
+
+    def _loop_data(self) -> LoopData:
+        """Return what the loop reads and writes."""
+        model, data = self.model, self.data
+        self._ticked = [c for c in self.controllers if isinstance(c, TickedController)]
+        ticks: list[WholeBodyArrays | HandIk] = []
+        self._prepared: list[tuple[int, RobotState, CompositeController]] = []
+        for k, (state, controller) in enumerate(self.pairs):
+            is_ticked = isinstance(controller, TickedController)
+            own = controller.loop_ticks() if is_ticked else ()
+            ticks += own
+            if not any(isinstance(tick, WholeBodyArrays) for tick in own):
+                self._prepared.append((k, state, controller))
         exact = all(solver.sensors.is_exact for solver in self._dynamic)
         believed = data if exact else mujoco.MjData(model)
         self._sources = [
@@ -97,25 +109,14 @@ class Simulation:
             )
             for c in ([] if exact else self._dynamic)
         ]
-        self._believed = believed
-        self._runs_plain, self._needed = not compiled, list[bytes]()
-        self._physics: Any = bind_physics(model, believed)
-        self._bodies: Any = tuple(solver.dynamics for solver in self._dynamic) or None
-        self._records = self._laws, self._drives
-        self._write_commands = write_commands
-        if compiled:
-            self._physics = as_argument(self._physics)
-            self._bodies = self._bodies and tuple(map(as_argument, self._bodies))
-        else:
-            self._write_commands = plain(write_commands)
-            self._records = tuple(x.view(np.recarray) for x in self._records)
-            self._bodies = self._bodies and tuple(map(for_plain_python, self._bodies))
-        states = *addresses(model, data), addresses(model, believed)[1]
-        self._first = *states, self._physics, as_argument(self._watch.state)
-        self._last = ticks, tuple(map(as_argument, self._sources)) or None
-        self.memory = self._make_memory()
-        self._new = self.memory.read()
-        self._call_loop(0)
+        loop = loop_data(model, data, self._laws, self._drives, believed=believed)
+        return loop._replace(
+            checked=self._watch.state,
+            bodies=tuple(solver.dynamics for solver in self._dynamic),
+            ticks=tuple(x for x in ticks if isinstance(x, WholeBodyArrays)),
+            hands=tuple(x for x in ticks if isinstance(x, HandIk)),
+            sources=tuple(self._sources),
+        )
 
     def _make_memory(self) -> Memory:
         """Return what laws, controllers and sensors go on from."""
@@ -127,20 +128,6 @@ class Simulation:
         for source in self._sources:
             parts += source_memory(source)
         return Memory([self._left, *parts])
-
-    def _loop_ticks(
-        self,
-    ) -> tuple[dict[int, TickedController], tuple[WholeBodyArrays, ...] | None]:
-        """Return the controllers whose ticks the loop runs, by index, and the ticks."""
-        controllers: dict[int, TickedController] = {}
-        ticks: list[WholeBodyArrays] = []
-        for k, controller in enumerate(self.controllers if self.compiled else ()):
-            if isinstance(controller, TickedController):
-                tick = controller.loop_tick()
-                if tick is not None:
-                    controllers[k] = controller
-                    ticks.append(tick)
-        return controllers, tuple(ticks) or None
 
     @property
     def timestep(self) -> float:
@@ -166,7 +153,7 @@ class Simulation:
             controller.reset(state)
         for source in self._sources:
             begin_source(source, self.data)
-        self._left[:] = 0
+        self._left[:] = self._loop.resumes[:] = 0
 
     def resume(self, memory: Vector) -> None:
         """Let controllers go on from values of `memory`, after `start`."""
@@ -193,19 +180,18 @@ class Simulation:
         self.loop_calls = 0
         while n > 0:
             steps = n
-            for k, (state, controller) in enumerate(self.pairs):
-                if k not in self._ticked:
-                    if self._left[k] <= 0:
-                        with self._watch:
-                            self._left[k] = controller.prepare(state)
-                    steps = min(steps, int(self._left[k]))
+            for k, state, controller in self._prepared:
+                if self._left[k] <= 0:
+                    with self._watch:
+                        self._left[k] = controller.prepare(state)
+                steps = min(steps, int(self._left[k]))
             done = self._call_loop(steps)
             self.loop_calls += 1
             n -= done
             self._left -= done
             if done < steps:
                 with self._watch:
-                    for ticked in self._ticked.values():
+                    for ticked in self._ticked:
                         ticked.finish_tick()
                     for dynamic in self._dynamic:
                         dynamic.finish_tick()
@@ -221,17 +207,14 @@ class Simulation:
         """Compile what the laws need, if that is not the same as before."""
         needed = [self._laws[name].tobytes() for name in DECIDING]
         if needed != self._needed:
-            kernels, self._owner = bind_kernels(
-                self._laws,
-                self._physics,
-                self._bodies,
-                self._last[0],
+            loop, kernels, self._owner = bind_kernels(
+                self._loop,
                 compiled=not self._runs_plain,
+                override=self._override,
             )
-            records = *self._records, kernels, self._bodies
-            law: tuple[Any, ...] = self._physics, *records
-            loop: tuple[Any, ...] = *self._first, *records, *self._last
-            self._law_arguments, self._loop_arguments = law, loop
+            self.loop_arguments = loop, kernels
+            if self._runs_plain:
+                self._plain_advance = plain(advance)
             self._needed = needed
 
     def _call_loop(self, steps: int) -> int:
@@ -239,36 +222,16 @@ class Simulation:
         self._bind_kernels()
         done = -1
         if math.isfinite(self.data.time):
-            if self.compiled:
-                done = advance(*self._loop_arguments, steps=steps)
-            elif self._watch.is_usable():
-                done = steps if self._step_in_python(steps) else -1
+            run = self._plain_advance if self._runs_plain else advance
+            done = run(*self.loop_arguments, steps=steps)
+        if self._override is not None and self._override.error is not None:
+            error, self._override.error = self._override.error, None
+            raise error
         if done < 0:
             self._watch.check()
         return done
 
-    def _sense(self) -> None:
-        """Write the believed state, in plain Python."""
-        sources = tuple(map(source_for_plain_python, self._sources))
-        plain(read_all_sensors)(sources)
-        mujoco.mj_kinematics(self.model, self._believed)
-        plain(use_all_feet)(sources)
-        mujoco.mj_step1(self.model, self._believed)
-
-    def _step_in_python(self, steps: int) -> bool:
-        """Do what `advance` does, with controllers that compute commands."""
-        model, data = self.model, self.data
-        for _ in range(steps):
-            mujoco.mj_step1(model, data)
-            if self._sources:
-                self._sense()
-            while not self._write_commands(*self._law_arguments):
-                for dynamic in self._dynamic:
-                    dynamic.finish_tick()
-            data.ctrl[:] = self._believed.ctrl
-            for state, controller in self._stepped:
-                data.ctrl[state.actuator_ids] = controller.compute(state)
-            mujoco.mj_step2(model, data)
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        return self._watch.is_sound()
+    def _compute(self) -> None:
+        """Write the commands of controllers that compute them."""
+        for state, controller in self._stepped:
+            self.data.ctrl[state.actuator_ids] = controller.compute(state)

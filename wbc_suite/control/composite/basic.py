@@ -16,6 +16,7 @@ from wbc_suite.control.part.controller import (
     PoseInput,
 )
 from wbc_suite.control.part.gripper import GripperController
+from wbc_suite.control.part.ik_tick import HandIk
 from wbc_suite.control.part.part_settings import PartSettings
 from wbc_suite.control.part.registry import (
     check_part,
@@ -128,6 +129,16 @@ class BasicController:
             (part.prepare(state) for part in self.parts.values()),
             default=UNTIL_NEXT_ACTION,
         )
+
+    def loop_ticks(self) -> tuple[HandIk, ...]:
+        """Return the ticks of parts that the control loop runs."""
+        ticks = (part.loop_tick() for part in self.parts.values())
+        return tuple(tick for tick in ticks if tick is not None)
+
+    def finish_tick(self) -> None:
+        """Finish the ticks that the loop has begun."""
+        for part in self.parts.values():
+            part.finish_tick()
 
     @property
     def hold_action(self) -> Vector:

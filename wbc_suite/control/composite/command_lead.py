@@ -1,7 +1,7 @@
 """How far commands of whole-body inverse kinematics may lead their joints."""
 
 from wbc_suite.compiling import compiled, inner
-from wbc_suite.control.loop.records import CompiledRecords
+from wbc_suite.control.loop.records import Drives
 from wbc_suite.control.part.spline_reference import SplineArrays, spline_end
 from wbc_suite.qp.limit import JointBounds, braking_step
 from wbc_suite.typing import Vector
@@ -20,7 +20,7 @@ def limit_steps(
     bounds: JointBounds,
     spline: SplineArrays,
     v: Vector,
-    drives: CompiledRecords,
+    drives: Drives,
     qpos: Vector,
     qvel: Vector,
 ) -> None:
@@ -35,7 +35,7 @@ def _limit_lead(
     bounds: JointBounds,
     spline: SplineArrays,
     v: Vector,
-    drives: CompiledRecords,
+    drives: Drives,
     qpos: Vector,
     qvel: Vector,
 ) -> float:

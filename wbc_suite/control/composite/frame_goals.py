@@ -8,15 +8,16 @@ import pinocchio as pin
 
 from wbc_suite.compiling import as_argument, compiled, inner, struct
 from wbc_suite.control.action import ActionLayout
-from wbc_suite.control.composite.frame_targets import (
-    FrameArrays,
+from wbc_suite.control.composite.frame_targets import FrameArrays
+from wbc_suite.control.composite.whole_body_config import GoalsConfig
+from wbc_suite.control.memory import Parts
+from wbc_suite.control.poses import (
+    multiply,
     pose_of,
     row_of,
     write_frame_pose,
     write_turn,
 )
-from wbc_suite.control.composite.whole_body_config import GoalsConfig
-from wbc_suite.control.memory import Parts
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.linear_algebra import copy_vector
@@ -73,28 +74,18 @@ def place_goals(
         write_frame_pose(robot.pose[goals.base_joint], goals.base_offset, goals.base)
     if goals.root >= 0:
         _write_inverse_root(qpos[goals.root :], pose)
-        _multiply(goals.base, pose, correction)
+        multiply(goals.base, pose, correction)
     for k in range(goals.goal.shape[0]):
         out = frames.goal[k]
         if goals.is_in_base:
-            _multiply(goals.base, goals.goal[k], out)
+            multiply(goals.base, goals.goal[k], out)
         else:
             copy_vector(goals.goal[k], out)
         if np.isfinite(goals.range[k, 0]):
             _bound(out, goals.home[k], goals.range[k])
         if goals.root >= 0:
             copy_vector(out, pose)
-            _multiply(correction, pose, out)
-
-
-@inner
-def _multiply(A: Vector, B: Vector, out: Vector) -> None:
-    """Write the pose `A B`."""
-    for row in range(0, 12, 4):
-        for j in range(4):
-            out[row + j] = A[row + 3] if j == 3 else 0.0
-            for k in range(3):
-                out[row + j] += A[row + k] * B[4 * k + j]
+            multiply(correction, pose, out)
 
 
 @inner

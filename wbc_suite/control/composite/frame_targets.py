@@ -12,7 +12,8 @@ import pinocchio as pin
 
 from wbc_suite.compiling import as_argument, compiled, compiled_inline, inner, struct
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
-from wbc_suite.control.part.approach import approach_speed, step_share
+from wbc_suite.control.part.approach import approach_pose, approach_speed
+from wbc_suite.control.poses import pose_of, row_of, write_frame_pose, write_turn
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import (
     JointKind,
@@ -21,7 +22,7 @@ from wbc_suite.kinematics.forward import (
     compute_joint_poses,
 )
 from wbc_suite.linear_algebra import copy_vector
-from wbc_suite.qp.lie import exp3, log3
+from wbc_suite.qp.lie import log3
 from wbc_suite.typing import Indices, Matrix, Vector
 
 CENTRE_OF_MASS = -1
@@ -148,43 +149,23 @@ def measure_frames(robot: RobotArrays, frames: FrameArrays) -> float:
 
 
 @inner
-def write_turn(start: Vector, end: Vector, turn: Matrix) -> None:
-    """Write the rotation from a pose to another in the axes of the first, (3, 3)."""
-    for i in range(3):
-        for j in range(3):
-            turn[i, j] = start[i] * end[j]
-            turn[i, j] += start[4 + i] * end[4 + j] + start[8 + i] * end[8 + j]
-
-
-@inner
-def write_frame_pose(joint: Vector, offset: Vector, pose: Vector) -> None:
-    """Write the pose of a frame from its joint's, which has R column by column."""
-    for i in range(3):
-        for j in range(4):
-            pose[4 * i + j] = joint[9 + i] if j == 3 else 0.0
-            for n in range(3):
-                pose[4 * i + j] += joint[3 * n + i] * offset[4 * n + j]
-
-
-@inner
 def _write_frame_targets(frames: FrameArrays, dt: float, rate: float) -> None:
-    """Write targets: position on a straight line, orientation about one axis.
+    """Write targets on the way to the goals.
 
     The rate is the fraction of its speed that a frame below level 0 may use.
     """
-    turn = np.empty((3, 3))
     for k in range(frames.joint.shape[0]):
-        pose, target, error = frames.pose[k], frames.target[k], frames.error[k]
-        most, braking = frames.max_speed[k], frames.braking[k]
-        gain, share = frames.gain[k], rate if frames.level[k] > 0 else 1.0
-        step = step_share(error[:3], dt, gain, share * most[0], braking[0])
-        spin = step_share(error[3:], dt, gain, share * most[1], braking[1])
-        exp3(spin * error[3], spin * error[4], spin * error[5], turn)
-        for i in range(3):
-            row, out = pose[4 * i : 4 * i + 4], target[4 * i : 4 * i + 4]
-            out[3] = row[3] + step * error[i]
-            for j in range(3):
-                out[j] = row[0] * turn[0, j] + row[1] * turn[1, j] + row[2] * turn[2, j]
+        share = rate if frames.level[k] > 0 else 1.0
+        approach_pose(
+            frames.pose[k],
+            frames.error[k],
+            dt,
+            frames.gain[k],
+            share,
+            frames.max_speed[k],
+            frames.braking[k],
+            frames.target[k],
+        )
 
 
 @inner
@@ -286,14 +267,3 @@ def _frame_arrays(
         error=np.zeros((n, 6)),
         distance=np.zeros((n, 2)),
     )
-
-
-def row_of(T: pin.SE3) -> Vector:
-    """Return a pose as [R p] row by row, shape (12,)."""
-    return T.homogeneous.ravel()[:12]
-
-
-def pose_of(row: Vector) -> pin.SE3:
-    """Return the pose of a row [R p], shape (12,)."""
-    T = row.reshape(3, 4)
-    return pin.SE3(T[:, :3], T[:, 3])

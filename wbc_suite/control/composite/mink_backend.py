@@ -7,12 +7,12 @@ import mujoco
 import numpy as np
 
 from wbc_suite.control.composite.backend import IkBackend, IkStep
-from wbc_suite.control.composite.frame_targets import pose_of
 from wbc_suite.control.composite.qp_tasks import TRACKING_COST, travel_costs
 from wbc_suite.control.composite.whole_body_config import (
     ControlledFrame,
     WholeBodyIKConfig,
 )
+from wbc_suite.control.poses import pose_of
 from wbc_suite.control.reasons import NoSolution, Reason
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration, Conversion

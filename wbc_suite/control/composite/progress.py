@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inline, inner, struct
+from wbc_suite.compiling import compiled, compiled_inline, inner, readable, struct
 from wbc_suite.control.composite.frame_targets import (
     FrameArrays,
     PostureArrays,
@@ -18,10 +18,9 @@ from wbc_suite.control.composite.frame_targets import (
     write_targets,
 )
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
-from wbc_suite.control.loop.records import Records, readable
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.planning import TimedState
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Matrix, Records, Vector
 
 STANDSTILL = 0.02  # rad/s or m/s
 STUCK_AFTER = 0.1  # s at a standstill

@@ -8,6 +8,7 @@ from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
 from wbc_suite.control.dynamics.state_source import StateSourceConfig
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.memory import Parts
+from wbc_suite.control.part.ik_tick import HandIk
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
@@ -79,11 +80,11 @@ class ResumableController(CompositeController, Protocol):
 class TickedController(CompositeController, Protocol):
     """A composite controller whose ticks the control loop can run."""
 
-    def loop_tick(self) -> WholeBodyArrays | None:
-        """Return the tick, or None where Python computes each.
+    def loop_ticks(self) -> tuple[WholeBodyArrays | HandIk, ...]:
+        """Return the ticks; none where Python computes each.
 
-        Called once the laws are in the loop's table. Without a tick `prepare` is
-        called as for other controllers.
+        Called once the laws are in the loop's table. With a whole-body tick `prepare`
+        is not called.
         """
         ...
 

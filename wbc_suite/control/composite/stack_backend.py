@@ -1,6 +1,7 @@
 """Inverse kinematics by this package's own QP task stack."""
 
 from functools import partial
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -149,7 +150,8 @@ class StackBackend(IkBackend):
     ) -> None:
         """Limit the next step as `command_lead.limit_steps` does."""
         bounds, spline = as_argument(self.stack.bounds), reference.argument
-        limit_steps(bounds, spline, self.v, law.drives, data.qpos, data.qvel)
+        drives: Any = law.drives
+        limit_steps(bounds, spline, self.v, drives, data.qpos, data.qvel)
 
     def loop_arrays(self) -> StackArrays:
         """Return what ticks in the control loop need."""

@@ -10,11 +10,11 @@ found; motors that saturate. The controller then finishes the tick, see
 """
 
 from enum import IntEnum
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import inner, struct
+from wbc_suite.compiling import Record, inner, struct
 from wbc_suite.control.composite.command_lead import limit_steps
 from wbc_suite.control.composite.finger_capsules import FingerArrays, place_fingers
 from wbc_suite.control.composite.frame_goals import GoalArrays, place_goals
@@ -32,12 +32,12 @@ from wbc_suite.control.composite.progress import (
 )
 from wbc_suite.control.composite.scene_obstacles import SceneArrays, measure_obstacles
 from wbc_suite.control.composite.torque_limiter import TorqueArrays, motors_suffice
-from wbc_suite.control.law.reference import set_reference
-from wbc_suite.control.loop.records import CompiledRecords, Records
+from wbc_suite.control.law.law import set_reference
+from wbc_suite.control.loop.records import Drives, Laws
 from wbc_suite.control.part.spline_reference import SplineArrays, extend_spline
 from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.qp.tick import TickArrays, TickStatus, solve_tick
-from wbc_suite.typing import Indices, Vector
+from wbc_suite.typing import Indices, Records, Vector
 
 _FIRST_LEVEL: int = np.int64(0)  # pyright: ignore[reportAssignmentType]
 """Typed, since a literal would be compiled once more."""
@@ -56,16 +56,19 @@ class TickStage(IntEnum):
     DONE_IN_PYTHON = 4
 
 
-TICK = np.dtype(
-    [
-        ("stage", "i8"),  # `TickStage`
-        ("event", "i8"),  # `Event` of the planner
-        ("status", "i8"),  # `TickStatus` of the QP
-        ("level", "i8"),  # at which it ended
-        ("countdown", "i8"),  # physics steps until the next tick
-    ]
-)
-"""State of a tick."""
+class TickState(Record):
+    """State of a tick."""
+
+    stage: int
+    """`TickStage`."""
+    event: int
+    """`Event` of the planner."""
+    status: int
+    """`TickStatus` of the QP."""
+    level: int
+    """At which it ended."""
+    countdown: int
+    """Physics steps until the next tick."""
 
 
 @struct
@@ -73,7 +76,7 @@ class WholeBodyArrays(NamedTuple):
     """What a tick reads and writes.
 
     Attributes:
-        state: `TICK` record, shape (1,).
+        state: `TickState`, shape (1,).
         qp: The stack of tasks; its robot is at the commanded configuration.
         task_level: Strict level of the task of each frame, shape (n,).
         task_row: Place of the task on its level, shape (n,).
@@ -102,18 +105,13 @@ class WholeBodyArrays(NamedTuple):
     steps: int
 
 
-Ticks: TypeAlias = Any
-"""A tuple of `WholeBodyArrays`, one for each robot whose ticks the loop runs; None
-without any, which leaves them out of the machine code."""
-
-
 @inner
 def run_tick(
     tick: WholeBodyArrays,
     qpos: Vector,
     qvel: Vector,
-    laws: CompiledRecords,
-    drives: CompiledRecords,
+    laws: Laws,
+    drives: Drives,
 ) -> bool:
     """Run a tick as far as it needs no Python; return whether it is done.
 

@@ -7,7 +7,6 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite import logs
-from wbc_suite.compiling import as_argument
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.backend import IkBackend
 from wbc_suite.control.composite.command_lead import MAX_LEAD
@@ -24,7 +23,7 @@ from wbc_suite.control.composite.reduced_robot import (
 )
 from wbc_suite.control.composite.scene_obstacles import SceneObstacles
 from wbc_suite.control.composite.stack_backend import StackBackend
-from wbc_suite.control.composite.tick import TICK, TickStage, WholeBodyArrays
+from wbc_suite.control.composite.tick import TickStage, TickState, WholeBodyArrays
 from wbc_suite.control.composite.waypoint_planner import Waypoint, WaypointPlanner
 from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
@@ -34,7 +33,6 @@ from wbc_suite.control.dynamics.arrays import Tracked
 from wbc_suite.control.dynamics.standing import Standing
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law
-from wbc_suite.control.loop.records import readable
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.feasible_acceleration import greatest_leads
 from wbc_suite.control.part.gripper import GripperController
@@ -63,8 +61,8 @@ class WholeBodyIK:
 
     Solves at `solve_hz` on the commanded configuration, which it integrates; the joint
     law tracks it, interpolated to the physics step. A free root is commanded too.
-    The control loop runs ticks itself, see `loop_tick`; what has no kernel is evaluated
-    in Python in between. The config is plain data of a `WholeBodyIKConfig`.
+    The control loop runs ticks itself, see `loop_ticks`; what has no kernel is
+    evaluated in Python in between. The config is plain data of a `WholeBodyIKConfig`.
 
     Attributes:
         layout: Slices of the action: controlled frames, then grippers.
@@ -115,7 +113,7 @@ class WholeBodyIK:
             self._backend.self_collision,
         )
         self._make_laws(state, float(limits.max()))
-        self._state = readable(np.zeros(1, TICK))
+        self._state = TickState.zeros()
         feet = {self.robot.link_of(held.frame) for held in self.config.held}
         self._report = IkReport(
             self.config, Configuration(model), self._conversion, feet
@@ -260,11 +258,11 @@ class WholeBodyIK:
         self._follow(self._planner.next(self._backend.v))
         return self._steps_per_solve
 
-    def loop_tick(self) -> WholeBodyArrays | None:
-        """Return the tick for the control loop, or None where Python has to solve."""
+    def loop_ticks(self) -> tuple[WholeBodyArrays, ...]:
+        """Return the tick for the control loop, or none where Python has to solve."""
         stack = self._backend.loop_arrays()
         if stack is None:
-            return None
+            return ()
         levels = stack.levels
         rows = [int((levels[:k] == levels[k]).sum()) for k in range(len(levels) - 1)]
         tick = WholeBodyArrays(
@@ -285,7 +283,7 @@ class WholeBodyIK:
             joint_law=self._law.index,
             steps=self._steps_per_solve,
         )
-        return as_argument(tick)
+        return (tick,)
 
     def finish_tick(self) -> None:
         """Finish a tick that the control loop has begun, if there is one."""

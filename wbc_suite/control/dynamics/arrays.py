@@ -364,14 +364,8 @@ def still_motion(start: Vector, joints: Vector) -> Tracked:
 
 
 def for_plain_python(body: WholeBodyDynamics) -> WholeBodyDynamics:
-    """Return the same arrays, with records whose fields plain Python reads."""
-    gait = body.gait._replace(
-        settings=body.gait.settings.view(np.recarray),
-        state=body.gait.state.view(np.recarray),
-    )
-    return body._replace(
-        state=body.state.view(np.recarray), gait=gait, planner=plain(body.planner)
-    )
+    """Return the same arrays, with a planner that is plain Python."""
+    return body._replace(planner=plain(body.planner))
 
 
 def _make_terms(n: int, edges: int) -> Terms:

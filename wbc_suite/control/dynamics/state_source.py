@@ -4,7 +4,7 @@ Laws read a second MuJoCo state, the believed one. In each step it is written fr
 readings of encoders and an IMU, with noise and delay, and from an estimate of the root.
 """
 
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import mujoco
 import numpy as np
@@ -16,7 +16,6 @@ from wbc_suite.control.dynamics.arrays import (
     WholeBodyDynamics,
     for_plain_python,
 )
-from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import rotated, rotation
 from wbc_suite.control.memory import Parts
 from wbc_suite.locomotion.base_estimator import (
@@ -130,8 +129,8 @@ class StateSource(NamedTuple):
     estimate: BaseEstimate
 
 
-Sources: TypeAlias = Any
-"""A tuple of `StateSource`, one for each robot with sensors; None without any."""
+Sources: TypeAlias = tuple[StateSource, ...]
+"""One for each robot with sensors."""
 
 
 def make_state_source(
@@ -220,10 +219,8 @@ def source_memory(source: StateSource) -> Parts:
 
 
 def source_for_plain_python(source: StateSource) -> StateSource:
-    """Return the same arrays, with records whose fields plain Python reads."""
-    return source._replace(
-        state=source.state.view(np.recarray), body=for_plain_python(source.body)
-    )
+    """Return the same arrays, with a robot for plain Python."""
+    return source._replace(body=for_plain_python(source.body))
 
 
 @compiled
@@ -240,13 +237,6 @@ def use_all_feet(sources: Sources) -> None:
     """Correct estimated roots; runs after `mj_kinematics` of the believed state."""
     for source in sources:
         _use_feet(source)
-
-
-@inner
-def pass_commands(physics: Physics, sources: Sources) -> None:
-    """Give the commands that laws computed from the believed state to the actuators."""
-    if sources is not None:
-        sources[0].true_ctrl[:] = physics.ctrl
 
 
 @inner

@@ -6,17 +6,16 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 
 from wbc_suite.compiling import compiled, inner
-from wbc_suite.control.law.law import Law
-from wbc_suite.control.law.reference import reference_at
+from wbc_suite.control.law.law import Law, reference_at
 from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import CompiledRecords, LawKind
+from wbc_suite.control.loop.records import Drive, Drives, LawKind, LawRecord
 from wbc_suite.control.state import RobotState
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 
 @inner
-def joint_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> None:
+def joint_law(physics: Physics, law: LawRecord, drives: Drives) -> None:
     """Write `a* + kp (q* - q) + kd (v* - v)` of each joint; see `JointLaw`."""
     for j in range(law.first, law.last):
         q, v, a = reference_at(law, drives[j])
@@ -24,9 +23,7 @@ def joint_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -
 
 
 @compiled
-def velocity_law(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords
-) -> None:
+def velocity_law(physics: Physics, law: LawRecord, drives: Drives) -> None:
     """Integrate the references by one step, and track them; see `VelocityLaw`."""
     for j in range(law.first, law.last):
         v, a = _commanded_velocity(law, drives[j])
@@ -35,7 +32,7 @@ def velocity_law(
 
 
 @compiled
-def base_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> None:
+def base_law(physics: Physics, law: LawRecord, drives: Drives) -> None:
     """Integrate a base's reference by one step, and track it; see `VelocityLaw`."""
     x, y, yaw = drives[law.first], drives[law.first + 1], drives[law.first + 2]
     forward, forward_rate = _commanded_velocity(law, x)
@@ -54,9 +51,7 @@ def base_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) ->
 
 
 @inner
-def _track(
-    physics: Physics, drive: CompiledRecords, q: float, v: float, a: float
-) -> None:
+def _track(physics: Physics, drive: Drive, q: float, v: float, a: float) -> None:
     """Write `a + kp (q - q_now) + kd (v - v_now)` with a bounded correction."""
     error = q - physics.qpos[drive.qpos]
     correction = drive.kp * error + drive.kd * (v - physics.qvel[drive.dof])
@@ -65,16 +60,14 @@ def _track(
 
 
 @inner
-def _commanded_velocity(
-    law: CompiledRecords, drive: CompiledRecords
-) -> tuple[float, float]:
+def _commanded_velocity(law: LawRecord, drive: Drive) -> tuple[float, float]:
     """Return the commanded velocity of a drive now, and its rate."""
     velocity = drive.velocity + min(law.since, law.duration) * drive.acceleration
     return velocity, drive.acceleration if law.since <= law.duration else 0.0
 
 
 @inner
-def _integrate(physics: Physics, drive: CompiledRecords, v: float) -> None:
+def _integrate(physics: Physics, drive: Drive, v: float) -> None:
     """Move a reference by one step, near its joint and within the joint's range."""
     q = physics.qpos[drive.qpos]
     position = drive.position + physics.timestep * v
@@ -195,7 +188,6 @@ class VelocityLaw(Law):
 
     def commanded(self) -> tuple[Vector, Vector]:
         """Return the commanded velocity now and its rate, shape (n,) each."""
-        since, duration = float(self.record["since"][0]), self.record["duration"][0]
-        rate = self.drives["acceleration"]
-        now = self.drives["velocity"] + min(since, duration) * rate
-        return now, float(since <= duration) * rate
+        now = [_commanded_velocity(self.record[0], drive) for drive in self.drives]
+        velocity, rate = np.reshape(now, (-1, 2)).T
+        return velocity, rate

@@ -1,16 +1,18 @@
 """Control laws: references of joints, and the records that the loop reads."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from wbc_suite.control.law.custom import law_kind
-from wbc_suite.control.loop.records import DRIVE, LAW, LawKind, Records, new_records
+from wbc_suite.compiling import inner
+from wbc_suite.control.loop.records import Drive, Drives, LawKind, LawRecord, Laws
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
-from wbc_suite.typing import Indices, Vector
+from wbc_suite.registry import Registry
+from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 DECELERATION = 10.0
 """rad/s^2 or m/s^2; joints stop at their limits with it unless the robot's description
@@ -21,6 +23,51 @@ LEAST_SHARE = 0.1
 
 FOREVER = np.inf
 """s; a reference that moves until it is replaced."""
+
+LAWS: Registry[Any] = Registry("law")
+"""Kernels `(physics, law, drives) -> None` of `wbc_suite.compiling.compiled`, by name.
+
+A kernel writes the accelerations of the law's joints, `drives[law.first : law.last]`,
+to `physics.acceleration[drive.dof]`. The loop then applies the limits of the joints and
+computes the torques.
+"""
+
+register_law = LAWS.register
+
+
+def law_kind(name: str) -> int:
+    """Return the number of a registered law in records; raises UnknownNameError."""
+    return int(LawKind.CUSTOM) + list(LAWS).index(LAWS.spelled(name))
+
+
+def law_kernel(kind: int) -> Any:
+    """Return the kernel of a registered law."""
+    return LAWS[list(LAWS)[kind - int(LawKind.CUSTOM)]]
+
+
+@inner
+def reference_at(law: LawRecord, drive: Drive) -> tuple[float, float, float]:
+    """Return position, velocity and acceleration of a drive's reference now."""
+    s = min(law.since, law.duration)
+    v, a, j = drive.velocity, drive.acceleration, drive.jerk
+    position = drive.position + s * (v + s * (0.5 * a + s / 6.0 * j))
+    if law.since > law.duration:
+        return position, 0.0, 0.0
+    return position, v + s * (a + 0.5 * s * j), a + s * j
+
+
+@inner
+def set_reference(record: Laws, drives: Drives, motion: Matrix) -> None:
+    """Set the reference of a law's record, shape (1,), and drives; see `Law.aim`.
+
+    The motion has positions, velocities, accelerations and jerks, shape (4, n).
+    """
+    for j in range(len(drives)):
+        drive = drives[j]
+        drive.position, drive.velocity = motion[0, j], motion[1, j]
+        drive.acceleration, drive.jerk = motion[2, j], motion[3, j]
+    record[0].since, record[0].duration = 0.0, np.inf
+
 
 _TIMES = ("since", "duration")
 _HAND = ("reference", "start", "shift", "turn")
@@ -38,8 +85,8 @@ class Law:
     The kind selects the kernel: a `LawKind`, or the name of a registered law.
 
     Attributes:
-        record: Its `LAW` record, shape (1,).
-        drives: Its `DRIVE` records, shape (n,).
+        record: Its `LawRecord`, shape (1,).
+        drives: Its `Drive` records, shape (n,).
         index: Its place in the table of a simulation.
 
     Raises:
@@ -59,8 +106,8 @@ class Law:
             if name not in places:
                 raise ConfigError(f"{state.robot.name}: joint '{name}' has no motor.")
         self.outputs: Indices = np.array([places[j] for j in joints], dtype=np.int64)
-        self.record: Records = new_records(1, LAW)
-        self.drives: Records = new_records(len(self.joints), DRIVE)
+        self.record: Records = LawRecord.zeros()
+        self.drives: Records = Drive.zeros(len(self.joints))
         self.record["kind"], self.record["compensation"] = kind, 1.0
         self.record["duration"] = FOREVER
         drives = self.drives
@@ -179,13 +226,9 @@ class Law:
 
     def target(self) -> tuple[Vector, Vector, Vector]:
         """Return position, velocity and acceleration of the reference, (n,) each."""
-        since, duration = float(self.record["since"][0]), self.record["duration"][0]
-        s, moving = min(since, duration), float(since <= duration)
-        drives = self.drives
-        rate, curve, bend = drives["velocity"], drives["acceleration"], drives["jerk"]
-        position = drives["position"] + s * (rate + s * (0.5 * curve + s / 6.0 * bend))
-        velocity = moving * (rate + s * (curve + 0.5 * s * bend))
-        return position, velocity, moving * (curve + s * bend)
+        now = [reference_at(self.record[0], drive) for drive in self.drives]
+        position, velocity, acceleration = np.reshape(now, (-1, 3)).T
+        return position, velocity, acceleration
 
 
 class ServoLaw(Law):

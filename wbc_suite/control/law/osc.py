@@ -7,9 +7,8 @@ import pinocchio as pin
 
 from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.law.law import Law
-from wbc_suite.control.law.pose_interpolation import interpolate_pose, pose_vector
 from wbc_suite.control.loop.physics import OscWork, Physics
-from wbc_suite.control.loop.records import CompiledRecords, LawKind
+from wbc_suite.control.loop.records import Drives, LawKind, LawRecord
 from wbc_suite.control.loop.rigid_body import (
     matrix_product,
     moves_body,
@@ -19,6 +18,7 @@ from wbc_suite.control.loop.rigid_body import (
     write_inertia,
 )
 from wbc_suite.control.memory import Parts
+from wbc_suite.control.poses import pose_vector
 from wbc_suite.control.state import RobotState
 from wbc_suite.linear_algebra import (
     cholesky,
@@ -28,7 +28,7 @@ from wbc_suite.linear_algebra import (
     solve_lower,
     solve_upper,
 )
-from wbc_suite.qp.lie import log3, saturate
+from wbc_suite.qp.lie import exp3, log3, saturate
 from wbc_suite.typing import Matrix, Vector
 
 SINGULAR = 1e-4
@@ -103,14 +103,9 @@ class OscLaw(Law):
 
     def target_pose(self) -> tuple[pin.SE3, Vector]:
         """Return pose and twist of the reference, in the reference body's axes."""
-        record = self.record[0]
-        duration = float(record["duration"])
-        phase = min(1.0, float(record["since"]) / duration) if duration > 0.0 else 1.0
-        moving = 1.0 / duration if 0.0 < duration >= record["since"] else 0.0
-        start, turn = record["start"][:9].reshape(3, 3), record["turn"]
-        position = record["start"][9:] + phase * record["shift"]
-        pose = pin.SE3(start @ pin.exp3(phase * turn), position)
-        return pose, moving * np.concatenate([record["shift"], start @ turn])
+        R, p, twist = np.empty((3, 3)), np.empty(3), np.empty(6)
+        interpolate_pose(self.record[0], np.eye(3), np.zeros(3), R, p, twist)
+        return pin.SE3(R, p), twist
 
     def site_pose(self, state: RobotState) -> pin.SE3:
         """Return the site's pose in the axes of the reference body."""
@@ -119,7 +114,7 @@ class OscLaw(Law):
 
 
 @compiled
-def osc_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> None:
+def osc_law(physics: Physics, law: LawRecord, drives: Drives) -> None:
     """Write the joint accelerations of `OscLaw`.
 
     With `M = C C^T` and `z = C^T (a - a0)` the law is the shortest z with
@@ -145,9 +140,7 @@ def osc_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> 
 
 
 @inner
-def write_hand_task(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords
-) -> None:
+def write_hand_task(physics: Physics, law: LawRecord, drives: Drives) -> None:
     """Write what a law of a hand begins with, in `physics.osc`.
 
     These are the law's `dofs`, the accelerations `posture` that hold its posture,
@@ -189,7 +182,7 @@ def _write_damped_factors(
 
 
 @inner
-def _write_site_jacobian(physics: Physics, law: CompiledRecords, n: int) -> None:
+def _write_site_jacobian(physics: Physics, law: LawRecord, n: int) -> None:
     """Write the site's Jacobian; subtract what other joints add from `wanted`.
 
     Other joints are those of laws before this one. Joints that carry the reference body
@@ -218,7 +211,7 @@ def _write_site_jacobian(physics: Physics, law: CompiledRecords, n: int) -> None
 
 
 @inner
-def _write_task_acceleration(physics: Physics, law: CompiledRecords) -> None:
+def _write_task_acceleration(physics: Physics, law: LawRecord) -> None:
     """Write `wanted = x'' - J' v`, and its part `pull = kd u` towards the goal."""
     work = physics.osc
     p_ws, R_ws = physics.site_xpos[law.site], rotation(physics.site_xmat, law.site)
@@ -240,8 +233,39 @@ def _write_task_acceleration(physics: Physics, law: CompiledRecords) -> None:
 
 
 @inner
+def interpolate_pose(
+    law: LawRecord,
+    R_wb: Matrix,
+    p_wb: Vector,
+    R_goal: Matrix,
+    p_goal: Vector,
+    twist: Vector,
+) -> None:
+    """Write the goal of an `OscLaw` at this time, and its twist, in the world.
+
+    In the axes of the reference body, whose pose is (R_wb, p_wb), the goal moves from
+    `start` by `shift` and `turn` in `duration`, at constant velocities. The twist,
+    linear then angular, is relative to that body.
+    """
+    phase, rate = 1.0, 0.0
+    if law.duration > 0.0:
+        phase = min(law.since / law.duration, 1.0)
+        rate = 1.0 / law.duration if law.since <= law.duration else 0.0
+    R_start, R_turned = np.empty((3, 3)), np.empty((3, 3))
+    matrix_product(R_wb, law.start[:9].reshape((3, 3)), R_start)
+    exp3(phase * law.turn[0], phase * law.turn[1], phase * law.turn[2], R_turned)
+    matrix_product(R_start, R_turned, R_goal)
+    for i in range(3):
+        p_goal[i], twist[i], twist[3 + i] = p_wb[i], 0.0, 0.0
+        for k in range(3):
+            p_goal[i] += R_wb[i, k] * (law.start[9 + k] + phase * law.shift[k])
+            twist[i] += rate * R_wb[i, k] * law.shift[k]
+            twist[3 + i] += rate * R_start[i, k] * law.turn[k]
+
+
+@inner
 def _add_feedback(
-    law: CompiledRecords,
+    law: LawRecord,
     R_wb: Matrix,
     error: Vector,
     twist: Vector,

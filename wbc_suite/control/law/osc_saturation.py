@@ -5,7 +5,7 @@ import numpy as np
 from wbc_suite.compiling import inner
 from wbc_suite.control.loop.acceleration_limits import acceleration_limits
 from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import CompiledRecords
+from wbc_suite.control.loop.records import Drives, LawRecord
 from wbc_suite.control.loop.rigid_body import multiply_inertia
 from wbc_suite.linear_algebra import cholesky, dot, lq_factor, solve_lower, solve_upper
 from wbc_suite.qp.least_change import least_change
@@ -22,9 +22,7 @@ _SHORTEST = 1e-12
 
 
 @inner
-def keep_direction(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords
-) -> None:
+def keep_direction(physics: Physics, law: LawRecord, drives: Drives) -> None:
     """Change a law's accelerations a so that saturated joints keep the direction.
 
     Where torques or joint velocities saturate, the velocity u towards the goal is
@@ -58,9 +56,7 @@ def keep_direction(
 
 
 @inner
-def is_saturated(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords
-) -> bool:
+def is_saturated(physics: Physics, law: LawRecord, drives: Drives) -> bool:
     """Return whether the accelerations that a law asks for leave its limits.
 
     Writes the room of accelerations, then of torques, in `physics.osc`.

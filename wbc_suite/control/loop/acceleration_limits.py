@@ -2,18 +2,16 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, inner
+from wbc_suite.compiling import inner
 from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import CompiledRecords
+from wbc_suite.control.loop.records import Drive, Drives, LawRecord
 
 RATE = 50.0
 """1/s; fastest exponential approach to a limit, and return from beyond it."""
 
 
 @inner
-def limit_accelerations(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords
-) -> None:
+def limit_accelerations(physics: Physics, law: LawRecord, drives: Drives) -> None:
     """Clip the accelerations that a law asks for to those that keep its limits."""
     for j in range(law.first, law.last):
         dof = drives[j].dof
@@ -21,10 +19,8 @@ def limit_accelerations(
         physics.acceleration[dof] = max(min(physics.acceleration[dof], upper), lower)
 
 
-@compiled
-def acceleration_limits(
-    physics: Physics, drive: CompiledRecords
-) -> tuple[float, float]:
+@inner
+def acceleration_limits(physics: Physics, drive: Drive) -> tuple[float, float]:
     """Return the least and the greatest acceleration of a joint.
 
     At the distance d from a limit the velocity towards it may be
@@ -46,9 +42,7 @@ def acceleration_limits(
 
 
 @inner
-def _greatest_acceleration(
-    distance: float, velocity: float, drive: CompiledRecords
-) -> float:
+def _greatest_acceleration(distance: float, velocity: float, drive: Drive) -> float:
     """Return the greatest acceleration towards a limit."""
     velocity_max, deceleration = drive.velocity_max, drive.deceleration
     corner = deceleration / RATE

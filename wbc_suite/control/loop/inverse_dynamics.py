@@ -7,77 +7,54 @@ the desired accelerations of all laws, d the estimated disturbances, f the conta
 forces of robots on their feet.
 """
 
-from typing import Any, TypeAlias
-
-from wbc_suite.compiling import compiled, inner
-from wbc_suite.control.dynamics.arrays import QpStage
+from wbc_suite.compiling import inner
+from wbc_suite.control.law.law import reference_at
 from wbc_suite.control.law.osc_saturation import is_saturated
-from wbc_suite.control.law.reference import reference_at
 from wbc_suite.control.loop.acceleration_limits import limit_accelerations
+from wbc_suite.control.loop.data import LoopData
 from wbc_suite.control.loop.kernels import LoopKernels
 from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import CompiledRecords, LawKind
+from wbc_suite.control.loop.records import Drives, LawKind, LawRecord
 from wbc_suite.control.loop.rigid_body import multiply_inertia
 
 _OSC, _TORQUE, _SERVO = int(LawKind.OSC), int(LawKind.TORQUE), int(LawKind.SERVO)
-_WRITTEN = int(QpStage.WRITTEN)
-
-WholeBodies: TypeAlias = Any
-"""A tuple of `WholeBodyDynamics`, one for each robot on its feet; None without any."""
 
 
-@compiled
-def write_commands(
-    physics: Physics,
-    laws: CompiledRecords,
-    drives: CompiledRecords,
-    kernels: LoopKernels,
-    bodies: WholeBodies,
-) -> bool:
+@inner
+def write_commands(loop: LoopData, kernels: LoopKernels) -> bool:
     """Write the commands of all actuators; runs between `mj_step1` and `mj_step2`.
 
     Returns:
         Whether it is done. Else the QP of a robot on its feet needs Python, after which
         this is called again.
     """
-    if bodies is None:
-        ask_accelerations(physics, laws, drives, kernels, bodies)
-    else:
-        if bodies[0].state[0].stage == _WRITTEN:  # else it goes on after Python
-            ask_accelerations(physics, laws, drives, kernels, bodies)
-        done = True
-        for body in bodies:
-            done = kernels.solve_body(physics, body) and done
-        if not done:
-            return False
-        for body in bodies:
-            kernels.write_body(physics, body)
+    physics, laws, drives = loop.physics, loop.laws, loop.drives
+    if loop.resumes[0] == 0:
+        ask_accelerations(loop, kernels)
+    loop.resumes[0] = 0
+    if not kernels.solve_bodies(loop):
+        loop.resumes[0] = 1
+        return False
     multiply_inertia(physics, physics.acceleration, physics.force)
-    if bodies is not None:
-        for body in bodies:
-            for j in range(body.torque.shape[0]):
-                physics.force[body.dofs[6 + j]] -= body.torque[j]
-    for k in range(laws.shape[0]):
+    kernels.add_contacts(loop)
+    for k in range(len(laws)):
         write_law_commands(physics, laws[k], drives)
     return True
 
 
 @inner
-def ask_accelerations(
-    physics: Physics,
-    laws: CompiledRecords,
-    drives: CompiledRecords,
-    kernels: LoopKernels,
-    bodies: WholeBodies,
-) -> None:
+def ask_accelerations(loop: LoopData, kernels: LoopKernels) -> None:
     """Write the accelerations that laws ask for, within the limits of their joints.
 
     Laws of hands build on those of the joints that carry them.
     """
-    kernels.observe(physics, laws, drives, bodies)
+    physics, laws, drives = loop.physics, loop.laws, loop.drives
+    physics.acceleration[:] = 0.0
+    kernels.observe_roots(loop)
+    kernels.observe(loop)
     physics.acceleration[:] = 0.0
     for hands in (False, True):
-        for k in range(laws.shape[0]):
+        for k in range(len(laws)):
             law = laws[k]
             if not hands:
                 law.since += physics.timestep
@@ -90,9 +67,7 @@ def ask_accelerations(
 
 
 @inner
-def write_law_commands(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords
-) -> None:
+def write_law_commands(physics: Physics, law: LawRecord, drives: Drives) -> None:
     """Write `M a + h - d - J^T f` within the limits of actuators, or setpoints.
 
     `physics.force` holds `M a - J^T f`. A torque law adds its torques to Coriolis,

@@ -2,9 +2,9 @@
 
 import warnings
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
-import numpy as np
 from numba import errors
 
 from wbc_suite.compiling import (
@@ -13,24 +13,26 @@ from wbc_suite.compiling import (
     by_address,
     compiled,
     inner,
+    is_compiling,
     plain,
     struct,
 )
 from wbc_suite.control.composite.tick import run_tick
 from wbc_suite.control.dynamics.solve_tick import solve_whole_body, write_whole_body
-from wbc_suite.control.law.custom import law_kernel
+from wbc_suite.control.dynamics.state_source import read_all_sensors, use_all_feet
 from wbc_suite.control.law.joint_laws import base_law, joint_law, velocity_law
+from wbc_suite.control.law.law import law_kernel
 from wbc_suite.control.law.osc import osc_law
 from wbc_suite.control.law.osc_saturation import keep_direction
-from wbc_suite.control.loop.disturbance_observer import observe_disturbances
-from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import (
-    DRIVE,
-    LAW,
-    CompiledRecords,
-    LawKind,
-    Records,
+from wbc_suite.control.loop.data import LoopData, for_kernels, for_plain_python
+from wbc_suite.control.loop.disturbance_observer import (
+    observe_disturbances,
+    observe_roots,
 )
+from wbc_suite.control.loop.mujoco_functions import mj_kinematics, mj_step1
+from wbc_suite.control.loop.physics import Physics
+from wbc_suite.control.loop.records import Drives, LawKind, LawRecord
+from wbc_suite.control.part.ik_tick import run_hand
 from wbc_suite.errors import ConfigError
 
 MOST_KINDS = 8
@@ -41,49 +43,128 @@ MOST_KINDS = 8
 class LoopKernels(NamedTuple):
     """Kernels by their addresses; those that a simulation does not use do nothing.
 
+    Those that take the loop's data return whether the step goes on without Python.
+
     Attributes:
-        law: Kernels of laws, shape (MOST_KINDS,); `LAW` records hold their places.
+        law: Kernels of laws, shape (MOST_KINDS,); `LawRecord`s hold their places.
         prepare: Compiles `keep_direction` when that is called for the first time: most
             arms are far from their limits.
         keep_direction: See `osc_saturation`.
+        observe_roots: See `disturbance_observer`.
         observe: See `disturbance_observer`.
-        run_tick: See `composite.tick`; None without ticks in the loop.
-        solve_body: See `solve_tick`; None without robots on their feet.
-        write_body: See `solve_tick`.
+        read_sensors: Writes the state that laws read.
+        run_ticks: See `composite.tick`.
+        run_hands: See `part.ik_tick`.
+        solve_bodies: See `solve_tick`.
+        add_contacts: Subtracts the torques of contact forces from `physics.force`.
+        pass_commands: Gives the commands of laws that read sensors to the actuators.
+        override: Writes the commands of controllers in Python; see `SteppedController`.
     """
 
     law: tuple[Callable[..., None], ...]
-    prepare: Callable[[], None]
+    prepare: Callable[[], bool]
     keep_direction: Callable[..., None]
-    observe: Callable[..., None]
-    run_tick: Callable[..., bool]
-    solve_body: Callable[..., bool]
-    write_body: Callable[..., None]
+    observe_roots: Callable[[LoopData], bool]
+    observe: Callable[[LoopData], bool]
+    read_sensors: Callable[[LoopData], bool]
+    run_ticks: Callable[[LoopData], bool]
+    run_hands: Callable[[LoopData], bool]
+    solve_bodies: Callable[[LoopData], bool]
+    add_contacts: Callable[[LoopData], bool]
+    pass_commands: Callable[[LoopData], bool]
+    override: Callable[[], bool]
 
 
 @inner
-def nothing() -> None:
+def nothing() -> bool:
     """Do nothing."""
+    return True
+
+
+@inner
+def no_law(physics: Physics, law: LawRecord, drives: Drives) -> None:
+    """Do nothing."""
+
+
+@inner
+def no_work(loop: LoopData) -> bool:
+    """Do nothing."""
+    return True
 
 
 @compiled
 def adopt(
-    kernels: LoopKernels, prepare: Callable[..., None], kernel: Callable[..., None]
+    kernels: LoopKernels, prepare: Callable[..., bool], kernel: Callable[..., None]
 ) -> None:
     """Use another kernel as `keep_direction`."""
     kernels.prepare, kernels.keep_direction = prepare, kernel  # pyright: ignore
 
 
 @inner
-def no_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> None:
-    """Do nothing."""
+def read_sensors(loop: LoopData) -> bool:
+    """Write what robots believe of their state."""
+    read_all_sensors(loop.sources)
+    mj_kinematics(loop.model, loop.believed)
+    use_all_feet(loop.sources)
+    mj_step1(loop.model, loop.believed)
+    return True
 
 
 @inner
-def no_observer(
-    physics: Physics, laws: CompiledRecords, drives: CompiledRecords, bodies: Any
-) -> None:
-    """Do nothing."""
+def pass_commands(loop: LoopData) -> bool:
+    """Give the commands that laws computed from the believed state to the actuators."""
+    loop.sources[0].true_ctrl[:] = loop.physics.ctrl
+    return True
+
+
+@compiled
+def run_ticks(loop: LoopData) -> bool:
+    """Run the whole-body ticks that are due; return whether all of them are done."""
+    if loop.resumes[0] == 1:
+        return True
+    qpos, qvel = loop.physics.qpos, loop.physics.qvel
+    for tick in loop.ticks:
+        is_due = tick.state[0].countdown <= 0
+        if is_due and not run_tick(tick, qpos, qvel, loop.laws, loop.drives):
+            return False
+    for tick in loop.ticks:
+        tick.state[0].countdown -= 1
+    return True
+
+
+@compiled
+def run_hands(loop: LoopData) -> bool:
+    """Do the same for hands with inverse kinematics of their own."""
+    if loop.resumes[0] == 1:
+        return True
+    for hand in loop.hands:
+        is_due = hand.state[0].countdown <= 0
+        if is_due and not run_hand(hand, loop.physics, loop.laws, loop.drives):
+            return False
+    for hand in loop.hands:
+        hand.state[0].countdown -= 1
+    return True
+
+
+@inner
+def solve_bodies(loop: LoopData) -> bool:
+    """Find contact forces and accelerations of robots; return whether all are found."""
+    done = True
+    for body in loop.bodies:
+        done = solve_whole_body(loop.physics, body) and done
+    if done:
+        for body in loop.bodies:
+            write_whole_body(loop.physics, body)
+    return done
+
+
+@inner
+def add_contacts(loop: LoopData) -> bool:
+    """Subtract the torques of contact forces and loads."""
+    for body in loop.bodies:
+        for j in range(body.torque.shape[0]):
+            loop.physics.force[body.dofs[6 + j]] -= body.torque[j]
+    return True
 
 
 _LAWS: dict[int, Any] = {
@@ -95,68 +176,73 @@ _LAWS: dict[int, Any] = {
 _NONE = {LawKind.TORQUE, LawKind.SERVO, LawKind.DYNAMICS}
 """Laws that ask for no accelerations."""
 
-
 DECIDING = "kind", "observer"
 """Fields of laws that decide which kernels they need."""
 
 
 def bind_kernels(
-    laws: Records,
-    physics: Physics,
-    bodies: Any = None,
-    ticks: Any = None,
+    loop: LoopData,
     *,
     compiled: bool = True,
-) -> tuple[LoopKernels, object]:
-    """Return the kernels that laws need, and write their places into the laws.
+    override: Callable[[], bool] | None = None,
+) -> tuple[LoopData, LoopKernels, object]:
+    """Return the arguments of the loop, and write the kernels' places into the laws.
 
-    The second value has to live as long as they do.
-
-    Args:
-        laws: `LAW` records.
-        physics: The argument that kernels get.
-        bodies: Robots on their feet, as kernels get them; None without any.
-        ticks: Whole-body ticks that run in the loop; None without any.
-        compiled: Whether kernels are compiled, or plain Python.
+    The third value has to live as long as they do, and what overrides commands too.
+    Without `compiled` they are for the loop in plain Python.
 
     Raises:
         ConfigError: If there are more than `MOST_KINDS` kinds of laws.
     """
-    kinds = sorted(set(laws["kind"].tolist()) - _NONE)
+    laws: Any = loop.laws
+    kinds = sorted({*laws["kind"].tolist()} - _NONE)
     if len(kinds) >= MOST_KINDS:
         raise ConfigError(
             f"A simulation has {len(kinds)} kinds of laws, {MOST_KINDS - 1} at most."
         )
-    law, drives = np.zeros(1, LAW)[0], np.zeros(0, DRIVE)
+    argument = for_kernels(loop) if compiled else for_plain_python(loop)
 
     def address(kernel: Any, *arguments: Any) -> Any:
         return by_address(kernel, *arguments) if compiled else plain(kernel)
 
-    def prepare() -> None:
-        adopt(found, address(nothing), address(keep_direction, *of_laws))
+    def used(kernel: Any, is_used: object) -> Any:
+        return address(kernel if is_used else no_work, argument)
 
-    of_laws, numbers = (physics, law, drives), np.zeros(0)
-    of_tick = numbers, numbers, laws, drives
-    kernels = [address(no_law, *of_laws)] * MOST_KINDS
+    def tick(kernel: Any, is_used: object) -> Any:
+        if compiled or not is_used or not is_compiling():
+            return used(kernel, is_used)
+        return partial(_run_compiled, kernel, for_kernels(loop))
+
+    def prepare() -> None:
+        adopt(kernels, address(nothing), address(keep_direction, *of_laws))
+
+    of_laws = as_argument(loop.physics), LawRecord.zeros()[0], loop.drives
+    of_kinds = [address(no_law, *of_laws)] * MOST_KINDS
     for k, kind in enumerate(kinds, 1):
-        kernels[k] = address(_LAWS.get(kind) or law_kernel(kind), *of_laws)
+        of_kinds[k] = address(_LAWS.get(kind) or law_kernel(kind), *of_laws)
         laws["kernel"][laws["kind"] == kind] = k
-    observe = observe_disturbances if laws["observer"].any() else no_observer
-    owner = Callback(prepare)
-    run: Any = ticks and address(run_tick, ticks[0], *of_tick)
-    solve: Any = bodies and address(solve_whole_body, physics, bodies[0])
-    write: Any = bodies and address(write_whole_body, physics, bodies[0])
-    found = LoopKernels(
-        law=tuple(kernels),
+    owner, is_observed = Callback(prepare), laws["observer"].any()
+    kernels = LoopKernels(
+        law=tuple(of_kinds),
         prepare=owner if compiled else nothing,
-        keep_direction=kernels[0] if compiled else plain(keep_direction),
-        observe=address(observe, physics, laws, drives, bodies),
-        run_tick=run,
-        solve_body=solve,
-        write_body=write,
+        keep_direction=of_kinds[0] if compiled else plain(keep_direction),
+        observe_roots=used(observe_roots, is_observed and loop.bodies),
+        observe=used(observe_disturbances, is_observed),
+        read_sensors=used(read_sensors, loop.sources),
+        run_ticks=tick(run_ticks, loop.ticks),
+        run_hands=tick(run_hands, loop.hands),
+        solve_bodies=used(solve_bodies, loop.bodies),
+        add_contacts=used(add_contacts, loop.bodies),
+        pass_commands=used(pass_commands, loop.sources),
+        override=override or address(nothing),
     )
     if compiled:
         with warnings.catch_warnings():  # a tuple of functions is new in numba
             warnings.simplefilter("ignore", errors.NumbaExperimentalFeatureWarning)
-            found = as_argument(found)
-    return found, owner
+            kernels = as_argument(kernels)
+    return argument, kernels, owner
+
+
+def _run_compiled(kernel: Any, own: LoopData, _: LoopData) -> bool:
+    """Run a tick as compiled code in the loop of plain Python."""
+    return kernel(own)

@@ -11,7 +11,7 @@ import llvmlite.binding
 import mujoco
 from numba import types
 
-from wbc_suite.compiling import inner
+from wbc_suite.compiling import external, inner
 from wbc_suite.typing import Vector
 
 _MODEL_AND_DATA = types.void(types.intp, types.intp)
@@ -19,12 +19,12 @@ _MODEL_AND_DATA = types.void(types.intp, types.intp)
 _LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco*"))
 llvmlite.binding.load_library_permanently(str(_LIBRARY))
 
-mj_step1 = types.ExternalFunction("mj_step1", _MODEL_AND_DATA)
-mj_step2 = types.ExternalFunction("mj_step2", _MODEL_AND_DATA)
-mj_kinematics = types.ExternalFunction("mj_kinematics", _MODEL_AND_DATA)
-mj_comPos = types.ExternalFunction("mj_comPos", _MODEL_AND_DATA)
-mj_geomDistance = types.ExternalFunction(
-    "mj_geomDistance",
+mj_step1 = external(mujoco.mj_step1, _MODEL_AND_DATA)
+mj_step2 = external(mujoco.mj_step2, _MODEL_AND_DATA)
+mj_kinematics = external(mujoco.mj_kinematics, _MODEL_AND_DATA)
+mj_comPos = external(mujoco.mj_comPos, _MODEL_AND_DATA)
+mj_geomDistance = external(
+    mujoco.mj_geomDistance,
     types.double(
         types.intp, types.intp, types.intc, types.intc, types.double, types.intp
     ),

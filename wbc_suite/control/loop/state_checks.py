@@ -85,7 +85,7 @@ def _all_usable(state: CheckedState) -> bool:
     return is_usable(state.gravity, LARGEST)
 
 
-@compiled
+@inner
 def _is_positive(values: Vector) -> bool:
     """Return whether all numbers are 0 or greater."""
     positive = True
@@ -94,7 +94,7 @@ def _is_positive(values: Vector) -> bool:
     return positive
 
 
-@compiled
+@inner
 def is_usable(values: Vector, most: float) -> bool:
     """Return whether all numbers are finite and not larger than `most`."""
     usable = True

@@ -6,9 +6,9 @@ each goal is replaced by one nearby, on the way to it.
 """
 
 import numpy as np
-import pinocchio as pin
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, inner
+from wbc_suite.qp.lie import exp3
 from wbc_suite.typing import Vector
 
 
@@ -45,22 +45,38 @@ def step_share(
     return min(1.0, speed * dt / (gain * distance))
 
 
+@inner
 def approach_pose(
-    now: pin.SE3,
-    goal: pin.SE3,
-    *,
+    pose: Vector,
+    error: Vector,
     dt: float,
     gain: float,
-    speed: tuple[float, float],
-    acceleration: tuple[float, float],
-) -> pin.SE3:
-    """Return a nearer goal, such that a step of `gain` times its error brakes in time.
+    share: float,
+    speed: Vector,
+    braking: Vector,
+    target: Vector,
+) -> None:
+    """Write a nearer goal, such that a step of `gain` times its error brakes in time.
 
-    Position moves along a straight line, orientation about one axis. Greatest speeds
-    and decelerations are those of linear, then of angular motion, m and rad.
+    Position moves along a straight line, orientation about one axis.
+
+    Args:
+        pose: Present pose, a row [R p], shape (12,).
+        error: Position error, m, and rotation vector to the goal in the axes of the
+            pose, shape (6,).
+        dt: Time of a step, s.
+        gain: Part of the error that a step removes.
+        share: Of the greatest speeds that may be used.
+        speed: Greatest speeds, m/s and rad/s, shape (2,).
+        braking: Decelerations, m/s^2 and rad/s^2, shape (2,).
+        target: Output, a row.
     """
-    offset = goal.translation - now.translation
-    turn = pin.log3(now.rotation.T @ goal.rotation)
-    offset *= step_share(offset, dt, gain, speed[0], acceleration[0])
-    turn *= step_share(turn, dt, gain, speed[1], acceleration[1])
-    return pin.SE3(now.rotation @ pin.exp3(turn), now.translation + offset)
+    turn = np.empty((3, 3))
+    step = step_share(error[:3], dt, gain, share * speed[0], braking[0])
+    spin = step_share(error[3:], dt, gain, share * speed[1], braking[1])
+    exp3(spin * error[3], spin * error[4], spin * error[5], turn)
+    for i in range(3):
+        row, out = pose[4 * i : 4 * i + 4], target[4 * i : 4 * i + 4]
+        out[3] = row[3] + step * error[i]
+        for j in range(3):
+            out[j] = row[0] * turn[0, j] + row[1] * turn[1, j] + row[2] * turn[2, j]

@@ -11,6 +11,7 @@ from wbc_suite.control.action import ActionPart
 from wbc_suite.control.dynamics.standing import Standing
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.memory import Parts
+from wbc_suite.control.part.ik_tick import HandIk
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.robot import RobotDescription
@@ -98,6 +99,16 @@ class PartController(ABC, Generic[LawType]):
     def prepare(self, state: RobotState) -> int:
         """Do what is due now; return for how many physics steps that is enough."""
         return UNTIL_NEXT_ACTION
+
+    def loop_tick(self) -> HandIk | None:
+        """Return the tick that the control loop runs for it; by default there is none.
+
+        Called once the law is in the loop's table.
+        """
+        return None
+
+    def finish_tick(self) -> None:
+        """Finish a tick that the loop has begun, if there is one."""
 
     def pose_input(self) -> PoseInput | None:
         """Return how to send the part's hand to a pose, if the action can."""

@@ -6,7 +6,6 @@ import numpy as np
 import pinocchio as pin
 from pydantic import model_validator
 
-from wbc_suite.control.law.pose_interpolation import pose_vector, vector_pose
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.part_settings import (
     ROUNDING,
@@ -17,6 +16,7 @@ from wbc_suite.control.part.part_settings import (
     check_axes,
     limits_of,
 )
+from wbc_suite.control.poses import pose_vector, vector_pose
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 

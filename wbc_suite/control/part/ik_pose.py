@@ -1,5 +1,6 @@
 """IK_POSE: actions are poses of the hand; inverse kinematics gives joint references."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -9,22 +10,22 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
 from wbc_suite.control.law.joint_laws import JointLaw
-from wbc_suite.control.law.pose_interpolation import pose_vector
 from wbc_suite.control.memory import Parts
-from wbc_suite.control.part.approach import approach_pose
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.part.feasible_acceleration import feasible_accelerations
-from wbc_suite.control.part.hand_goal import HandGoal, HandSettings
+from wbc_suite.control.part.hand_goal import HandGoal, HandSettings, relative_pose
+from wbc_suite.control.part.ik_tick import HandIk, HandState
 from wbc_suite.control.part.part_settings import (
     REACH,
     ROUNDING,
-    InputScaling,
     Numbers,
     PartSettings,
+    SliceInput,
     apply_torque_settings,
     damping_of,
 )
 from wbc_suite.control.part.spline_reference import SplineReference, window_length
+from wbc_suite.control.poses import row_of, vector_pose
 from wbc_suite.control.reasons import LazyReasons, Reason
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
@@ -38,8 +39,9 @@ from wbc_suite.qp import (
     TickRecord,
     VelocityLimit,
 )
+from wbc_suite.qp.tick import TickStatus
 from wbc_suite.tomlfile import FrozenModel
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Vector
 
 AXES = (Axis.X, Axis.Y, Axis.Z, Axis.QX, Axis.QY, Axis.QZ, Axis.QW)
 
@@ -100,8 +102,14 @@ class IkPoseController(PartController[JointLaw]):
     """Moves a hand's goal by actions of a position and a quaternion, x y z w.
 
     The quaternion is the pose's, or in delta mode that of the turn; it is normalised,
-    and one of length 0 is no turn. The law tracks joint references that are smooth
-    between two solves.
+    and one of length 0 is no turn. A stack of QP tasks over the joints of the part
+    moves their references, in the control loop (`ik_tick`), so that the hand goes to
+    the goal:
+
+        minimise    || J dq - gain e ||^2,  then  || q + dq - q_rest ||^2
+        subject to  limits of position, velocity and acceleration
+
+    References are smooth between two solves.
     """
 
     needs_hand = True
@@ -110,21 +118,116 @@ class IkPoseController(PartController[JointLaw]):
         self, part: RobotPart, config: IkPoseConfig, state: RobotState
     ) -> None:
         assert part.hand is not None
-        self.config, self._state = config, state
+        self.config, self._state, self._hand = config, state, part.hand
+        site = state.model.site(state.prefix + part.hand).id
         kd = damping_of(config.kp, config.damping_ratio)
         self.law = JointLaw(state, part.joints, kp=config.kp, kd=kd)
         apply_torque_settings(self.law, config)
         self.law.keep_limits(state)
-        step = float(state.model.opt.timestep)
-        self._steps = max(1, round(1.0 / (config.solve_hz * step)))
-        self._ik = _PartIk(state, part, config.motion, self._steps * step)
         self._base = state.model.body(state.prefix + state.robot.links[0].name).id
         if config.input_ref_frame == "world":
             self._base = 0
-        self._scaling = InputScaling(3, config, config.output_min, config.output_max)
-        self.slices = (_pose_part(part.name, config, self._scaling),)
+        data = state.data
+        self._frames = (
+            data.xmat[self._base].reshape(3, 3),
+            data.xpos[self._base],
+            data.site_xmat[site].reshape(3, 3),
+            data.site_xpos[site],
+        )
+        self._input = SliceInput(
+            part.name,
+            SliceKind.POSE,
+            labels=AXES[:3],
+            units=(Unit("m"),) * 3,
+            config=config,
+            outputs=(config.output_min, config.output_max),
+            limits=(np.full(3, -REACH), np.full(3, REACH)),
+        )
+        self.slices = (_with_quaternion(self._input.action),)
         self._goal = HandGoal(config)
-        self._due = np.zeros(1)  # time of the next solve, s
+        self._tick = HandState.zeros()
+        self._make_stack(part)
+
+    def _make_stack(self, part: RobotPart) -> None:
+        """Make the stack and the spline of the part alone; other joints are fixed."""
+        robot, motion = self._state.robot, self.config.motion
+        whole, joints = robot.to_pinocchio(), part.joints
+        others = [i for i, name in enumerate(whole.names) if i and name not in joints]
+        model = pin.buildReducedModel(whole, others, pin.neutral(whole))
+        self._configuration = Configuration(model)
+        found = [model.joints[self._configuration.joint_id(name)] for name in joints]
+        self._places = np.array([joint.idx_q for joint in found], dtype=np.int64)
+        speeds = np.array([joint.idx_v for joint in found], dtype=np.int64)
+        feasible = feasible_accelerations(
+            robot, most=motion.acceleration, effort_share=motion.effort_share
+        )
+        own = {joint: feasible[joint] for joint in joints}
+        hand = FrameTask(
+            self._hand,
+            gain=motion.gain,
+            max_linear_speed=UNLIMITED,
+            max_angular_speed=UNLIMITED,
+        )
+        self._posture = PostureTask(
+            motion.posture_cost, gain=motion.posture_gain, level=1
+        )
+        limits = (
+            PositionLimit(margin=1e-3),
+            VelocityLimit(),
+            AccelerationLimit(motion.acceleration, joints=own),
+        )
+        self._stack = TaskStack(
+            self._configuration, [hand, self._posture], limits=limits, escape=False
+        )
+        step = float(self._state.model.opt.timestep)
+        self._steps = max(1, round(1.0 / (self.config.solve_hz * step)))
+        self._period = self._steps * step
+        mean = window_length(max(own.values()), motion.jerk, self._period)
+        self._spline = SplineReference(
+            self._configuration, self._places, speeds, self._period, mean=mean
+        )
+        self._rest = self._configuration.q.copy()
+        carrier = next(
+            link.parent
+            for link in robot.links
+            if link.joint is not None and link.joint.name == joints[0]
+        )
+        self._carrier = str(carrier)
+        self._carrier_pose = row_of(self._configuration.frame_pose(self._carrier))
+
+    def loop_tick(self) -> HandIk:
+        """Return the tick for the control loop, once the law is in its table."""
+        motion, state, model = (
+            self.config.motion,
+            self._state,
+            self._configuration.model,
+        )
+        hand = model.frames[self._configuration.frame_id(self._hand)]
+        return HandIk(
+            state=self._tick,
+            goal=self._goal.vector,
+            base=self._base,
+            carrier=state.model.body(state.prefix + self._carrier).id,
+            carrier_pose=self._carrier_pose,
+            joint=int(hand.parentJoint),
+            offset=row_of(hand.placement),
+            gain=motion.gain,
+            speed=np.array(motion.speed),
+            braking=np.array(motion.braking),
+            qp=self._stack.arrays,
+            spline=self._spline.argument,
+            law=self.law.index,
+            steps=self._steps,
+        )
+
+    def finish_tick(self) -> None:
+        """Finish a tick that the control loop has begun, if there is one."""
+        tick = self._tick[0]
+        if tick.status != TickStatus.SOLVED and tick.countdown <= 0:
+            status, level = int(tick.status), int(tick.level)
+            self._spline.extend(self._stack.complete(self._period, status, level).v)
+            self.law.aim(*self._spline.motion)
+            tick.countdown = self._steps
 
     @property
     def goal(self) -> pin.SE3:
@@ -133,19 +236,27 @@ class IkPoseController(PartController[JointLaw]):
 
     @property
     def memory(self) -> Parts:
-        """Goal, the time of the next solve, and what the last one left."""
-        return *self._goal.memory, self._due, *self._ik.memory
+        """Goal, steps until the next tick, and what the last one left; views."""
+        own = self._tick["countdown"], self._configuration.q, self._rest
+        return *self._goal.memory, *own, *self._spline.memory, *self._stack.memory
 
     def resume(self, state: RobotState) -> None:
         """Take the posture that is preferred, and the configuration solved last."""
-        self._ik.resume()
+        self._configuration.refresh()
+        self._posture.set_target(self._rest)
 
     def reset(self, state: RobotState) -> None:
-        """Hold the hand where it is, and the posture that it has."""
-        self._ik.reset(state)
-        self._goal.reset(pose_vector(self._hand()))
-        self.law.aim(state.data.qpos[self.law.drives["qpos"]])
-        self._due[:] = state.time
+        """Hold the hand where it is; the present posture becomes the preferred one."""
+        q = state.data.qpos[self.law.drives["qpos"]]
+        self._configuration.q[self._places] = q
+        self._configuration.refresh()
+        self._stack.reset()
+        self._rest[:] = self._configuration.q
+        self._posture.set_target(self._rest)
+        self._spline.reset()
+        self._goal.reset(relative_pose(*self._frames))
+        self.law.aim(q)
+        self._tick["status"], self._tick["countdown"] = TickStatus.SOLVED, 0
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take a position and a quaternion, x y z w, shape (7,)."""
@@ -159,24 +270,14 @@ class IkPoseController(PartController[JointLaw]):
         rotation = np.zeros(3) if turn is None else pin.log3(turn)
         angle = float(np.linalg.norm(rotation))
         rotation = rotation * min(1.0, self.config.turn_limit / max(angle, ROUNDING))
-        step = np.concatenate([self._scaling(values[:3]), rotation])
-        self._goal.step(step, pose_vector(self._hand()))
-
-    def prepare(self, state: RobotState) -> int:
-        """Solve when it is time to; return how many physics steps are left."""
-        step = float(state.model.opt.timestep)
-        left = round((self._due.item() - state.time) / step)
-        if left > 0:
-            return left
-        self._due[:] = state.time + self._steps * step
-        self.law.aim(*self._ik.solve(state, self._reference() * self.goal))
-        return self._steps
+        step = np.concatenate([self._input.scaling(values[:3]), rotation])
+        self._goal.step(step, relative_pose(*self._frames))
 
     @property
     def hold_action(self) -> Vector:
         """The action that keeps the goal."""
         if self.config.input_type == "delta":
-            return np.concatenate([self._scaling.neutral, [0.0, 0.0, 0.0, 1.0]])
+            return np.concatenate([self._input.neutral, [0.0, 0.0, 0.0, 1.0]])
         return pin.SE3ToXYZQUAT(self.goal)
 
     def report(self, state: RobotState) -> dict[str, Any]:
@@ -184,9 +285,9 @@ class IkPoseController(PartController[JointLaw]):
 
         The keys are those of a `TaskReport`.
         """
-        goal, hand = self._reference() * self.goal, self._ik.measured(state)
-        position = float(np.linalg.norm(goal.translation - hand.translation))
-        angle = float(np.linalg.norm(pin.log3(hand.rotation.T @ goal.rotation)))
+        error = vector_pose(relative_pose(*self._frames)).actInv(self.goal)
+        position = float(np.linalg.norm(error.translation))
+        angle = float(np.linalg.norm(pin.log3(error.rotation)))
         linear, angular = self.config.tolerance
         near = position <= linear and angle <= angular
         return {
@@ -194,148 +295,28 @@ class IkPoseController(PartController[JointLaw]):
             "position_error": position,
             "orientation_error": angle,
             "reached": near,
-            "reasons": () if near else self._ik.reasons(),
+            "reasons": () if near else self._reasons(),
         }
 
-    def _hand(self) -> pin.SE3:
-        """Return the measured pose of the hand in the goals' axes."""
-        return self._reference().actInv(self._ik.measured(self._state))
-
-    def _reference(self) -> pin.SE3:
-        """Return the pose of the goals' axes in the world."""
-        data = self._state.data
-        R = data.xmat[self._base].reshape(3, 3)
-        return pin.SE3(R.copy(), data.xpos[self._base].copy())
+    def _reasons(self) -> LazyReasons:
+        """Return why the hand is not at its goal; computed when first read."""
+        in_loop = self._tick["status"][0] == TickStatus.SOLVED
+        record = self._stack.solution().record if in_loop else self._stack.record()
+        return LazyReasons(partial(_explain, record, self._hand))
 
 
-def _pose_part(name: str, config: IkPoseConfig, scaling: InputScaling) -> ActionPart:
-    """Return the action slice: x y z, and a quaternion."""
-    units, high = (Unit("m"),) * 3, np.full(3, REACH)
-    low = -high
-    if config.input_type == "delta":
-        low, high, units = scaling.low, scaling.high, scaling.units(units)
-    return ActionPart(
-        name=name,
-        kind=SliceKind.POSE,
+def _with_quaternion(position: ActionPart) -> ActionPart:
+    """Return the slice of a position with a quaternion after it."""
+    return replace(
+        position,
         labels=AXES,
-        units=(*units, *(Unit("quaternion"),) * 4),
-        low=(*low.tolist(), *(-1.0,) * 4),
-        high=(*high.tolist(), *(1.0,) * 4),
+        units=(*position.units, *(Unit("quaternion"),) * 4),
+        low=(*position.low, *(-1.0,) * 4),
+        high=(*position.high, *(1.0,) * 4),
         wraps=True,
     )
 
 
-class _PartIk:
-    """Moves the joint references of a part so that its hand goes to a pose.
-
-    A task stack over these joints alone; all others enter by the measured pose of the
-    link that carries the part:
-
-        minimise    || J dq - gain e ||^2,  then  || q + dq - q_rest ||^2
-        subject to  limits of position, velocity and acceleration
-
-    The period is the time between two solves, s.
-    """
-
-    def __init__(
-        self, state: RobotState, part: RobotPart, motion: IkMotion, period: float
-    ) -> None:
-        self._hand, self._motion, self._period = str(part.hand), motion, period
-        self._site = state.model.site(state.prefix + self._hand).id
-        joints, whole = part.joints, state.robot.to_pinocchio()
-        others = [i for i, name in enumerate(whole.names) if i and name not in joints]
-        model = pin.buildReducedModel(whole, others, pin.neutral(whole))
-        self._configuration = Configuration(model)
-        found = [model.joints[self._configuration.joint_id(name)] for name in joints]
-        self._places = np.array([joint.idx_q for joint in found], dtype=np.int64)
-        speeds = np.array([joint.idx_v for joint in found], dtype=np.int64)
-        self._addresses = state.joint_addresses(joints)[0]
-        carrier = next(
-            link.parent
-            for link in state.robot.links
-            if link.joint is not None and link.joint.name == joints[0]
-        )
-        self._carrier = state.model.body(f"{state.prefix}{carrier}").id
-        self._T_oc = self._configuration.frame_pose(str(carrier))
-        feasible = feasible_accelerations(
-            state.robot, most=motion.acceleration, effort_share=motion.effort_share
-        )
-        own = {joint: feasible[joint] for joint in joints}
-        self._task = FrameTask(
-            self._hand,
-            gain=motion.gain,
-            max_linear_speed=UNLIMITED,
-            max_angular_speed=UNLIMITED,
-        )
-        self._rest = self._configuration.q.copy()
-        self._posture = PostureTask(
-            motion.posture_cost, gain=motion.posture_gain, level=1
-        )
-        self._stack = TaskStack(
-            self._configuration,
-            [self._task, self._posture],
-            limits=[
-                PositionLimit(margin=1e-3),
-                VelocityLimit(),
-                AccelerationLimit(motion.acceleration, joints=own),
-            ],
-            escape=False,
-        )
-        mean = window_length(max(own.values()), motion.jerk, period)
-        self._spline = SplineReference(
-            self._configuration, self._places, speeds, period, mean=mean
-        )
-
-    @property
-    def memory(self) -> Parts:
-        """Configuration, spline, QP and preferred posture; views."""
-        q, rest = self._configuration.q, self._rest
-        return q, rest, *self._spline.memory, *self._stack.memory
-
-    def resume(self) -> None:
-        """Compute what follows from values that were written into `memory`."""
-        self._configuration.refresh()
-        self._posture.set_target(self._rest)
-
-    def reset(self, state: RobotState) -> None:
-        """Start from rest; the present posture becomes the preferred one."""
-        self._configuration.q[self._places] = state.data.qpos[self._addresses]
-        self._configuration.refresh()
-        self._stack.reset()
-        self._rest[:] = self._configuration.q
-        self._posture.set_target(self._rest)
-        self._spline.reset()
-
-    def solve(self, state: RobotState, goal: pin.SE3) -> Matrix:
-        """Plan the next period towards a pose in the world; return the spline's motion.
-
-        It is a buffer.
-        """
-        R = state.data.xmat[self._carrier].reshape(3, 3)
-        T_wc = pin.SE3(R, state.data.xpos[self._carrier])
-        target = approach_pose(
-            self._configuration.frame_pose(self._hand),
-            self._T_oc * T_wc.actInv(goal),
-            dt=self._period,
-            gain=self._motion.gain,
-            speed=self._motion.speed,
-            acceleration=self._motion.braking,
-        )
-        self._task.set_target(target)
-        self._spline.extend(self._stack.solve(self._period).v)
-        return self._spline.motion
-
-    def measured(self, state: RobotState) -> pin.SE3:
-        """Return the pose of the hand in the world."""
-        data = state.data
-        R = data.site_xmat[self._site].reshape(3, 3)
-        return pin.SE3(R.copy(), data.site_xpos[self._site].copy())
-
-    def reasons(self) -> LazyReasons:
-        """Return why the hand is not at its goal; computed when first read."""
-        return LazyReasons(partial(_reasons, self._stack.record(), self._hand))
-
-
-def _reasons(record: TickRecord, hand: str) -> tuple[Reason, ...]:
+def _explain(record: TickRecord, hand: str) -> tuple[Reason, ...]:
     reports = record.explain(position_tolerance=0.0, orientation_tolerance=0.0)
     return reports[hand].reasons if hand in reports else ()

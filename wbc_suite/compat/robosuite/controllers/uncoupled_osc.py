@@ -19,10 +19,10 @@ from wbc_suite.compat.robosuite.controllers.variable_impedance import (
     GainsFirstController,
 )
 from wbc_suite.compiling import compiled, inner
-from wbc_suite.control.law.custom import law_kind, register_law
+from wbc_suite.control.law.law import law_kind, register_law
 from wbc_suite.control.law.osc import OscLaw, write_hand_task
 from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import CompiledRecords
+from wbc_suite.control.loop.records import Drives, LawRecord
 from wbc_suite.control.loop.rigid_body import point_velocity_and_drift
 from wbc_suite.control.part.impedance import Gains
 from wbc_suite.control.part.osc_controller import OscConfig, OscController
@@ -37,24 +37,20 @@ TINY = 1e-12
 
 
 @compiled
-def uncoupled_osc_law(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords
-) -> None:
+def uncoupled_osc_law(physics: Physics, law: LawRecord, drives: Drives) -> None:
     """Write the joint accelerations of the law with `uncouple_pos_ori`."""
     _write_accelerations(physics, law, drives, 3)
 
 
 @compiled
-def coupled_osc_law(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords
-) -> None:
+def coupled_osc_law(physics: Physics, law: LawRecord, drives: Drives) -> None:
     """Write the joint accelerations of the law without `uncouple_pos_ori`."""
     _write_accelerations(physics, law, drives, 6)
 
 
 @inner
 def _write_accelerations(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords, size: int
+    physics: Physics, law: LawRecord, drives: Drives, size: int
 ) -> None:
     """Write the joint accelerations M^-1 (tau - h); blocks of the wrench have a size.
 

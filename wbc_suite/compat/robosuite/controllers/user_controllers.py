@@ -202,6 +202,8 @@ class _Adapter:
     resume = forwarded("_inner", "resume", "Goes on from values in `memory`.")
     reset = forwarded("_inner", "reset", "Starts from the robot's state.")
     prepare = forwarded("_inner", "prepare", "Updates the laws.")
+    loop_ticks = forwarded("_inner", "loop_ticks", "Returns the ticks of the loop.")
+    finish_tick = forwarded("_inner", "finish_tick", "Finishes ticks of the loop.")
 
     def set_goal(self, action: Vector, period: float = 0.05) -> None:
         self.user.set_period(period)
