@@ -7,6 +7,7 @@ import ctypes
 import inspect
 import logging
 import time
+import warnings
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba import types
+from numba import errors, types
 from numba.core import event
 from numba.experimental import structref
 from numba.extending import register_jitable
@@ -215,7 +216,9 @@ def as_argument(values: Fields) -> Fields:
         return values
     fields = [as_argument(x) if hasattr(x, "pack") else x for x in values]
     kind: Any = type(values)
-    return kind.pack(kind(*fields))
+    with warnings.catch_warnings():  # a tuple of functions is new in numba
+        warnings.simplefilter("ignore", errors.NumbaExperimentalFeatureWarning)
+        return kind.pack(kind(*fields))
 
 
 class _StructType(types.StructRef):

@@ -166,7 +166,7 @@ def compute_com(robot: RobotArrays) -> None:
             subtree[parents[j], i] += subtree[j, i]
     scale = 1.0 / subtree[0, 3]
     for j in range(1, joints):
-        x, y, z, m = subtree[j]
+        x, y, z, m = subtree[j, 0], subtree[j, 1], subtree[j, 2], subtree[j, 3]
         for k in range(robot.v_start[j], robot.v_start[j] + robot.v_count[j]):
             v, out = columns[k], com_columns[k]
             out[0] = scale * (m * v[0] + v[4] * z - v[5] * y)

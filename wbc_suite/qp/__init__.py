@@ -8,18 +8,15 @@ configuration.update(configuration.integrate(solution.dq))
 """
 
 from wbc_suite.qp.com_task import ComTask
-from wbc_suite.qp.dynamics_space import Contact, MomentumTask
-from wbc_suite.qp.dynamics_stack import DynamicsSolution, DynamicsStack
 from wbc_suite.qp.equality import Equality, FrameEquality, LinearEquality
-from wbc_suite.qp.floor_limit import FloorLimit
 from wbc_suite.qp.frame_task import FrameTask, RelativeFrameTask
 from wbc_suite.qp.joint_coupling_task import JointCouplingTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
-from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, LimitKind, RowLimit
 from wbc_suite.qp.look_at_task import LookAtTask
 from wbc_suite.qp.motion import Approach, Escaping, Motion, Overshoot, Relaxed
-from wbc_suite.qp.obstacle_limit import ObstacleLimit
+from wbc_suite.qp.part import record_type
+from wbc_suite.qp.plane_limits import FloorLimit, ObstacleLimit
 from wbc_suite.qp.posture_task import DampingTask, PostureTask
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.registry import LIMITS, TASKS, register_limit, register_task
@@ -47,10 +44,7 @@ __all__ = [
     "BoxLimit",
     "ComTask",
     "Conflict",
-    "Contact",
     "DampingTask",
-    "DynamicsSolution",
-    "DynamicsStack",
     "Equality",
     "Escaping",
     "Fallback",
@@ -60,13 +54,11 @@ __all__ = [
     "JointBounds",
     "JointCouplingTask",
     "JointTask",
-    "Kernel",
     "Limit",
     "LimitKind",
     "LinearEquality",
     "LinkPair",
     "LookAtTask",
-    "MomentumTask",
     "Motion",
     "ObstacleLimit",
     "OutOfReach",
@@ -90,6 +82,7 @@ __all__ = [
     "TickRecord",
     "VelocityLimit",
     "WeightLimit",
+    "record_type",
     "register_limit",
     "register_task",
 ]

@@ -237,8 +237,8 @@ def _deactivate(qp: QpArrays) -> bool:
     return changed
 
 
-@compiled
-def _activate(qp: QpArrays, only_one: bool) -> bool:  # noqa: C901, one search
+@inner
+def _activate(qp: QpArrays, only_one: bool) -> bool:
     """Make active what is violated, or the worst of it; return if there is any.
 
     Clips what is violated by rounding.
@@ -246,30 +246,25 @@ def _activate(qp: QpArrays, only_one: bool) -> bool:  # noqa: C901, one search
     n, found, worst, state = qp.x.shape[0], -1, 0.0, 0
     x, side, lower, upper = qp.x, qp.side, qp.lower, qp.upper
     wanted, rows = qp.wanted, qp.rows
-    for i in range(n):
-        over, under = x[i] - upper[i], lower[i] - x[i]
-        violation = over if over > under else under
-        if violation <= _TOLERANCE:  # False for what is not a number
-            x[i] = min(max(x[i], lower[i]), upper[i])
-            continue
-        new = 1 if over > under else -1
+    for i in range(n + qp.counts[0]):
+        if i < n:
+            over, under = x[i] - upper[i], lower[i] - x[i]
+            violation, new = (over, 1) if over > under else (under, -1)
+            if violation <= _TOLERANCE:  # False for what is not a number
+                x[i] = min(max(x[i], lower[i]), upper[i])
+                continue
+        else:
+            soft = wanted[i - n] < upper[i] and side[i] == 0
+            bound, new = (wanted[i - n], _SOFT) if soft else (upper[i], _HARD)
+            if side[i] == _HARD:
+                continue
+            violation = dot(rows[i - n], x, n) - bound
+            if violation <= _ROW_TOLERANCE:
+                continue
         if not only_one:
             side[i] = new
         if found < 0 or violation > worst:
             found, worst, state = i, violation, new
-    for row in range(qp.counts[0]):
-        if side[n + row] == _HARD:
-            continue
-        bound = upper[n + row]
-        soft = wanted[row] < bound and side[n + row] == 0
-        violation = dot(rows[row], x, n) - (wanted[row] if soft else bound)
-        if violation <= _ROW_TOLERANCE:
-            continue
-        new = _SOFT if soft else _HARD
-        if not only_one:
-            side[n + row] = new
-        if found < 0 or violation > worst:
-            found, worst, state = n + row, violation, new
     if only_one and found >= 0:
         side[found] = state
     return found >= 0

@@ -1,14 +1,28 @@
 """Tasks on all joints: pull them to a posture, or let them stand still."""
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from wbc_suite.arguments import check_array
+from wbc_suite.compiling import inner
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.task import JointTask, SharedRow
-from wbc_suite.typing import Vector
+from wbc_suite.kinematics.forward import RobotArrays
+from wbc_suite.qp.part import SharedRow, nothing
+from wbc_suite.qp.task import JointTask
+from wbc_suite.typing import Matrix, Vector
+
+
+@inner
+def posture_error(
+    robot: RobotArrays, own: Vector, dt: float, rows: Matrix, values: Vector
+) -> None:
+    """Write how far joints of one parameter are from a posture, which own is."""
+    q, q_start, v_start, v_count = robot.q, robot.q_start, robot.v_start, robot.v_count
+    for j in range(1, q_start.shape[0]):
+        if v_count[j] == 1:
+            k = q_start[j]
+            values[v_start[j]] = own[k] - q[k]
 
 
 class PostureTask(JointTask):
@@ -22,7 +36,7 @@ class PostureTask(JointTask):
     Other arguments are those of `JointTask`.
     """
 
-    kernel: ClassVar[Kernel] = Kernel.POSTURE
+    kernel: ClassVar[Any] = posture_error
 
     def __init__(
         self,
@@ -77,7 +91,7 @@ class PostureTask(JointTask):
 class DampingTask(JointTask):
     """Prefer small steps: `e = 0`, `J = I`; arguments are those of `JointTask`."""
 
-    kernel: ClassVar[Kernel] = Kernel.CONSTANT
+    kernel: ClassVar[Any] = nothing
 
     def __init__(
         self,
@@ -88,7 +102,3 @@ class DampingTask(JointTask):
         name: str = "damping",
     ) -> None:
         super().__init__(name, cost=cost, costs=costs, level=level)
-
-    def evaluate(self, configuration: Configuration, error: Vector) -> None:
-        """Write zeros."""
-        error[:] = 0.0

@@ -1,11 +1,9 @@
 """The kernels that the control loop calls by their address: those of its laws."""
 
-import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import errors
 
 from wbc_suite.compiling import (
     Callback,
@@ -156,7 +154,5 @@ def bind_kernels(
         write_body=write,
     )
     if compiled:
-        with warnings.catch_warnings():  # a tuple of functions is new in numba
-            warnings.simplefilter("ignore", errors.NumbaExperimentalFeatureWarning)
-            found = as_argument(found)
+        found = as_argument(found)
     return found, owner
