@@ -119,7 +119,7 @@ class IkReport:
         else it is the solver's, or the limits where the solver has none.
         """
         standing = float(np.abs(answer.v).max(initial=0.0)) < COMMAND_STANDSTILL
-        explain = answer.record() if answer.record is not None else dict
+        explain = answer.explain or dict
         held_back: Reasons = [()] * len(reached)
         compare = cache(partial(self._compare, commanded.q, commanded.goals))
         if standing and any(compare()[1]):

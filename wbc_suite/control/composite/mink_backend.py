@@ -6,14 +6,13 @@ import mink
 import mujoco
 import numpy as np
 
-from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.backend import IkBackend, IkStep
 from wbc_suite.control.composite.frame_targets import pose_of
 from wbc_suite.control.composite.qp_tasks import TRACKING_COST, travel_costs
 from wbc_suite.control.composite.whole_body_config import (
     ControlledFrame,
     WholeBodyIKConfig,
 )
-from wbc_suite.control.memory import Parts
 from wbc_suite.control.reasons import NoSolution, Reason
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration, Conversion
@@ -52,7 +51,7 @@ class HeldPoint(mink.Task):
         return pose.rotation().as_matrix() @ J_local[:3]
 
 
-class MinkBackend:
+class MinkBackend(IkBackend):
     """`IkBackend` over mink's weighted tasks and limits, solved by daqp.
 
     Levels become weights; there is no limit of accelerations and none of obstacles.
@@ -72,6 +71,8 @@ class MinkBackend:
         self._config, self._commanded = config, commanded
         self._model = robot.to_mjspec().compile()
         self._conversion = Conversion(self._model, commanded.model)
+        self.v: Vector = np.zeros(commanded.nv)
+        self._last = IkStep(v=self.v)
         self._configuration = mink.Configuration(self._model)
         self._sites = {self._model.site(i).name for i in range(self._model.nsite)}
         self._tasks = [self._task(frame) for frame in config.frames]
@@ -84,18 +85,14 @@ class MinkBackend:
 
     def reset(self) -> None:
         """Hold feet where they are."""
-        self._place()
-        for task in self._held:
-            task.set_target_from_configuration(self._configuration)
-
-    @property
-    def memory(self) -> Parts:
-        """Nothing: mink's tasks keep no numbers."""
-        return ()
+        self.v[:], self._last = 0.0, IkStep(v=np.zeros_like(self.v))
+        self.resume()
 
     def resume(self) -> None:
         """Hold feet where they are commanded."""
-        self.reset()
+        self._place()
+        for task in self._held:
+            task.set_target_from_configuration(self._configuration)
 
     def set_targets(self, targets: Matrix) -> None:
         """Set the targets of all controlled frames."""
@@ -109,14 +106,21 @@ class MinkBackend:
         """Set the posture to prefer."""
         self._posture.set_target(self._conversion.q_to_mujoco(q))
 
-    def solve(self, dt: float) -> IkStep:
+    def solve(self, dt: float, left: tuple[int, int] | None = None) -> None:
         """Solve one tick; hold still where mink finds no solution."""
-        return self._solve([*self._tasks, self._posture], dt)
+        self._take(self._solve([*self._tasks, self._posture], dt))
 
-    def solve_posture(self, posture: Vector, dt: float) -> IkStep:
+    def solve_posture(self, posture: Vector, dt: float) -> None:
         """Solve one tick without frames."""
         self._joints.set_target(self._conversion.q_to_mujoco(posture))
-        return self._solve([self._joints], dt)
+        self._take(self._solve([self._joints], dt))
+
+    def last_step(self, *, in_loop: bool) -> IkStep:
+        """Return the answer of the last tick."""
+        return self._last
+
+    def _take(self, step: IkStep) -> None:
+        self.v[:], self._last = step.v, step
 
     def _place(self) -> None:
         """Move mink's robot to the commanded configuration."""

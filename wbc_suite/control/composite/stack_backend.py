@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.compiling import as_argument
-from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.backend import IkBackend, IkStep, StackArrays
 from wbc_suite.control.composite.command_lead import limit_steps
 from wbc_suite.control.composite.frame_kinds import NO_SPEED_LIMIT, set_target
 from wbc_suite.control.composite.qp_tasks import (
@@ -37,17 +37,15 @@ from wbc_suite.qp import (
 )
 from wbc_suite.qp.registry import LIMITS, TASKS, made_of
 from wbc_suite.robot import RobotDescription
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Matrix, Vector
 
 
-class StackBackend:
+class StackBackend(IkBackend):
     """`IkBackend` over a `TaskStack`.
 
     Attributes:
         stack: The stack of frames and posture.
         torque_limiter: Limits what it solves for.
-        self_collision: The limit that keeps links apart, if there is one.
-        v: Velocity of the last tick, shape (nv,), for whoever solves the next one.
     """
 
     def __init__(
@@ -90,6 +88,7 @@ class StackBackend:
         others = [made_of(TASKS, table) for table in config.tasks]
         self.stack = make_stack([*self._tasks, self._posture, *others])
         self.v: Vector = np.zeros(commanded.nv)
+        self._last: tuple[TaskStack, Solution] | None = None
         max_acceleration = accelerations(robot, config, commanded)
         self.torque_limiter = TorqueLimiter(robot, commanded, max_acceleration)
         self._joints = PostureTask(
@@ -108,7 +107,7 @@ class StackBackend:
             limit.reset()
         self.stack.reset()
         self._joint_stack.reset()
-        self.v[:] = 0.0
+        self.v[:], self._last = 0.0, None
 
     @property
     def memory(self) -> Parts:
@@ -130,17 +129,20 @@ class StackBackend:
         """Set the posture to prefer."""
         self._posture.set_target(q)
 
-    def solve(self, dt: float) -> IkStep:
+    def solve(self, dt: float, left: tuple[int, int] | None = None) -> None:
         """Solve one tick of the stack."""
-        self.stack.v_previous[:] = self.v
-        return self._step(self.stack, self.stack.solve(dt), dt)
+        if left is None:
+            self.stack.v_previous[:] = self.v
+            self._take(self.stack, self.stack.solve(dt), dt)
+        else:
+            self._take(self.stack, self.stack.complete(dt, *left), dt)
 
-    def solve_posture(self, posture: Vector, dt: float) -> IkStep:
+    def solve_posture(self, posture: Vector, dt: float) -> None:
         """Solve one tick of the stack without frames."""
         self._joints.set_target(posture)
         self._joint_stack.v_previous[:] = self.v
         self._joint_stack.bounds.step_max[:] = self.stack.bounds.step_max
-        return self._step(self._joint_stack, self._joint_stack.solve(dt), dt)
+        self._take(self._joint_stack, self._joint_stack.solve(dt), dt)
 
     def limit_steps(
         self, reference: SplineReference, law: JointLaw, data: mujoco.MjData
@@ -149,33 +151,34 @@ class StackBackend:
         bounds, spline = as_argument(self.stack.bounds), reference.argument
         limit_steps(bounds, spline, self.v, law.drives, data.qpos, data.qvel)
 
-    def finish(self, dt: float, status: int, level: int) -> IkStep:
-        """Finish a tick that `solve_tick` has left with a `TickStatus` at a level."""
-        return self._step(self.stack, self.stack.complete(dt, status, level), dt)
-
-    def last_step(self) -> IkStep:
-        """Return the answer of a tick of the stack that `solve_tick` has solved."""
-        return self._answer(self.stack, self.stack.solution(), self.v.copy())
-
-    @property
-    def task_levels(self) -> Indices:
-        """Place of each frame's task among the strict levels, then the posture's."""
+    def loop_arrays(self) -> StackArrays:
+        """Return what ticks in the control loop need."""
         tasks = [*self._tasks, self._posture]
         levels = sorted({task.level for task in tasks})
-        return np.array([levels.index(task.level) for task in tasks], dtype=np.int64)
+        places = [levels.index(task.level) for task in tasks]
+        return StackArrays(
+            self.stack.arrays,
+            np.array(places, dtype=np.int64),
+            self.torque_limiter.argument,
+        )
 
-    def _step(self, stack: TaskStack, solution: Solution, dt: float) -> IkStep:
-        v = self.torque_limiter.apply(self.v, solution.v, dt)
-        self.v[:] = v
-        return self._answer(stack, solution, v)
+    def _take(self, stack: TaskStack, solution: Solution, dt: float) -> None:
+        self.v[:] = self.torque_limiter.apply(self.v, solution.v, dt)
+        self._last = stack, solution
 
-    def _answer(self, stack: TaskStack, solution: Solution, v: Vector) -> IkStep:
-        explains = stack is self.stack
+    def last_step(self, *, in_loop: bool) -> IkStep:
+        """Return the answer of the last tick."""
+        if in_loop:
+            stack, solution = self.stack, self.stack.solution()
+        elif self._last is not None:
+            stack, solution = self._last
+        else:
+            return IkStep(v=self.v.copy())
         return IkStep(
-            v=v,
+            v=self.v.copy(),
             limits=partial(_limits, solution),
             ok=solution.ok,
-            record=partial(partial, _reasons, solution.record) if explains else None,
+            explain=partial(_reasons, solution.record) if stack is self.stack else None,
         )
 
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 from wbc_suite import logs
 from wbc_suite.compiling import as_argument
 from wbc_suite.control.action import ActionLayout
-from wbc_suite.control.composite.backend import IkBackend, IkStep
+from wbc_suite.control.composite.backend import IkBackend
 from wbc_suite.control.composite.command_lead import MAX_LEAD
 from wbc_suite.control.composite.finger_capsules import FingerCapsules
 from wbc_suite.control.composite.frame_goals import FrameGoals, place_goals
@@ -108,11 +108,11 @@ class WholeBodyIK:
         self._backend = backend(
             self.robot, self.config, self._configuration, self._scene.limit
         )
-        limit = None
-        if isinstance(self._backend, StackBackend):
-            limit = self._backend.self_collision
         self._fingers = FingerCapsules(
-            state, self._configuration, self._scene.commanded, limit
+            state,
+            self._configuration,
+            self._scene.commanded,
+            self._backend.self_collision,
         )
         self._make_laws(state, float(limits.max()))
         self._state = readable(np.zeros(1, TICK))
@@ -218,7 +218,6 @@ class WholeBodyIK:
         """Hold the robot where it is."""
         self._configuration.update(self._conversion.q_to_pinocchio(state.data.qpos))
         self._reference.reset()
-        self._answer = IkStep(v=np.zeros(self._configuration.nv))
         self._state["stage"], self._state["countdown"] = Stage.DONE_IN_PYTHON, 0
         motion, held = self._reference.motion, state.data.qpos[self._held_index]
         motion[0, motion.shape[1] - len(held) :] = held
@@ -254,20 +253,19 @@ class WholeBodyIK:
     def prepare(self, state: RobotState) -> int:
         """Run a tick; return for how many physics steps it is enough."""
         robot, qpos = self._configuration.robot, state.data.qpos
-        if isinstance(self._backend, StackBackend):
-            self._backend.limit_steps(self._reference, self._law, state.data)
+        self._backend.limit_steps(self._reference, self._law, state.data)
         place_goals(self._goals.argument, robot, self.frames.argument, qpos)
         self._scene.measure()
         self._fingers.place()
-        self._follow_waypoint(self._planner.next(self._answer.v))
+        self._follow(self._planner.next(self._backend.v))
         return self._steps_per_solve
 
     def loop_tick(self) -> WholeBodyArrays | None:
-        """Return the tick for the control loop, or None where mink solves it."""
-        backend = self._backend
-        if not isinstance(backend, StackBackend):
+        """Return the tick for the control loop, or None where Python has to solve."""
+        stack = self._backend.loop_arrays()
+        if stack is None:
             return None
-        levels = backend.task_levels
+        levels = stack.levels
         rows = [int((levels[:k] == levels[k]).sum()) for k in range(len(levels) - 1)]
         tick = WholeBodyArrays(
             state=self._state,
@@ -277,13 +275,13 @@ class WholeBodyIK:
             fingers=self._fingers.argument,
             posture=self.frames.posture_argument,
             progress=self._planner.argument,
-            qp=backend.stack.arrays,
+            qp=stack.qp,
             task_level=levels[:-1].copy(),
             task_row=np.array(rows, dtype=np.int64),
             posture_level=int(levels[-1]),
-            motors=backend.torque_limiter.argument,
+            motors=stack.motors,
             spline=self._reference.argument,
-            v=backend.v,
+            v=self._backend.v,
             joint_law=self._law.index,
             steps=self._steps_per_solve,
         )
@@ -295,29 +293,26 @@ class WholeBodyIK:
         stage = int(tick["stage"])
         if stage in (Stage.DONE, Stage.DONE_IN_PYTHON):
             return
-        assert isinstance(backend, StackBackend)
         if stage == Stage.PLAN:
-            waypoint = self._planner.respond(int(tick["event"]), backend.v)
-            self._follow_waypoint(waypoint)
+            self._follow(self._planner.respond(int(tick["event"]), backend.v))
         else:
-            status, level = int(tick["status"]), int(tick["level"])
-            self._follow(backend.finish(self._dt, status, level))
+            backend.solve(self._dt, (int(tick["status"]), int(tick["level"])))
+            self._move()
         tick["countdown"] = self._steps_per_solve
 
-    def _follow_waypoint(self, waypoint: Waypoint) -> None:
-        """Solve for a waypoint."""
+    def _follow(self, waypoint: Waypoint) -> None:
+        """Solve for a waypoint, and move the commanded robot."""
         if waypoint.targets is None:
-            answer = self._backend.solve_posture(waypoint.posture, self._dt)
+            self._backend.solve_posture(waypoint.posture, self._dt)
         else:
             self._backend.set_targets(waypoint.targets)
             self._backend.set_posture(waypoint.posture)
-            answer = self._backend.solve(self._dt)
-        self._follow(answer)
+            self._backend.solve(self._dt)
+        self._move()
 
-    def _follow(self, answer: IkStep) -> None:
-        """Move the commanded robot, and hand the spline to the laws."""
-        self._answer = answer
-        self._reference.extend(answer.v)
+    def _move(self) -> None:
+        """Move the commanded robot as solved, and hand the spline to the laws."""
+        self._reference.extend(self._backend.v)
         self._law.aim(*self._reference.motion)
         self._state["stage"] = Stage.DONE_IN_PYTHON
 
@@ -346,12 +341,10 @@ class WholeBodyIK:
 
     def info(self, state: RobotState) -> dict[str, Any]:
         """Return `{"ik": ...}`: what is reached, by how much it is missed, and why."""
-        goals, answer = self._goals.in_world(), self._answer
+        goals, stage = self._goals.in_world(), self._state["stage"][0]
         corrected = self._corrected(goals, state)
         commanded = Commanded(self.q, corrected, self.joint_targets)
-        if self._state["stage"][0] == Stage.DONE:
-            assert isinstance(self._backend, StackBackend)
-            answer = self._backend.last_step()
+        answer = self._backend.last_step(in_loop=stage == Stage.DONE)
         frames = self._report.frames(state, goals, answer, commanded)
         reached = all(report["reached"] for report in frames.values())
         return {"ik": {"reached": reached, "frames": frames}}
