@@ -12,7 +12,7 @@ from wbc_suite.qp import (
     Relaxed,
     TaskStack,
 )
-from wbc_suite.qp.overshoot import turned
+from wbc_suite.qp.tick import turned
 
 DT = 0.01
 

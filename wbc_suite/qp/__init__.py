@@ -15,7 +15,7 @@ from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, Velocity
 from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, LimitKind, RowLimit
 from wbc_suite.qp.look_at_task import LookAtTask
 from wbc_suite.qp.motion import Approach, Escaping, Motion, Overshoot, Relaxed
-from wbc_suite.qp.part import record_type
+from wbc_suite.qp.part import SharedRow, record_type
 from wbc_suite.qp.plane_limits import FloorLimit, ObstacleLimit
 from wbc_suite.qp.posture_task import DampingTask, PostureTask
 from wbc_suite.qp.problem import Problem
@@ -72,6 +72,7 @@ __all__ = [
     "RowLimit",
     "RowTask",
     "SelfCollisionLimit",
+    "SharedRow",
     "Sole",
     "Solution",
     "SupportLimit",

@@ -99,7 +99,7 @@ class Equality:
     dim: int
     target_row: SharedRow = SharedRow(0)
 
-    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
+    def bind(self, configuration: Configuration) -> None:
         """Resolve names in a model."""
 
     def own(self, configuration: Configuration) -> Vector:

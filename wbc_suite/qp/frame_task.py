@@ -13,7 +13,7 @@ from wbc_suite.kinematics.forward import RobotArrays, pack_pose
 from wbc_suite.qp.lie import LARGEST_FINITE, inverse_left_jacobian, is_usable, log3
 from wbc_suite.qp.part import SharedRow, place_frame, record_type
 from wbc_suite.qp.task import RowTask, cost_vector
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 FRAME = record_type(
     ("joint", "i8"),  # parent joint of the frame
@@ -167,6 +167,10 @@ class FrameTask(RowTask):
         self._frame["offset"] = pack_pose(frame.placement)
         if not self.target_row.is_set:
             self.set_target(configuration.frame_pose(self.frame))
+
+    def support(self, configuration: Configuration) -> Indices:
+        """Return the velocity indices between the root and the frame."""
+        return configuration.support(self.frame)
 
     def own(self, configuration: Configuration) -> Vector:
         """Return a `FRAME` record."""

@@ -60,6 +60,10 @@ class JointCouplingTask(RowTask):
         self._q: Indices = np.array([joint.idx_q for joint in joints])
         self._v: Indices = np.array([joint.idx_v for joint in joints])
 
+    def support(self, configuration: Configuration) -> Indices:
+        """Return the two velocity indices."""
+        return np.sort(self._v)
+
     def evaluate(
         self, configuration: Configuration, error: Vector, jacobian: Matrix
     ) -> None:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from wbc_suite.compiling import as_argument
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.qp.constraints import Constraints, with_rows
@@ -125,8 +124,13 @@ class Level:
     def held(self) -> tuple[str, ...]:
         """Return the names of the tasks whose target was not finite."""
         tasks = *(task for task, _ in self._rows), *self._joint_tasks
-        finite = [*self.arrays.tasks["is_finite"], *self.arrays.joint_tasks["is_finite"]]
-        return tuple(t.name for t, known in zip(tasks, finite, strict=True) if not known)
+        finite = [
+            *self.arrays.tasks["is_finite"],
+            *self.arrays.joint_tasks["is_finite"],
+        ]
+        return tuple(
+            t.name for t, known in zip(tasks, finite, strict=True) if not known
+        )
 
     def _attach_costs(self) -> list[Vector]:
         """Let costs follow those of the tasks; return the copies."""

@@ -71,7 +71,7 @@ class RowLimit:
     unit: str = "m"
     relax_speed: float = np.inf
 
-    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
+    def bind(self, configuration: Configuration) -> None:
         """Resolve names in a model; called when a stack is built."""
 
     def own(self, configuration: Configuration) -> Vector:
@@ -87,7 +87,7 @@ class RowLimit:
         """
         run_kernel(self, configuration.robot, self.own(configuration), dt, G, h)
 
-    def reset(self) -> None:  # noqa: B027, may be empty
+    def reset(self) -> None:
         """Discard memory of earlier ticks; called by a stack's `reset`."""
 
     @property

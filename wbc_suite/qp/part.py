@@ -211,7 +211,12 @@ def run_kernel(
 
 @compiled
 def _call(
-    kernel: Any, robot: RobotArrays, own: Vector, dt: float, rows: Matrix, values: Vector
+    kernel: Any,
+    robot: RobotArrays,
+    own: Vector,
+    dt: float,
+    rows: Matrix,
+    values: Vector,
 ) -> None:
     kernel(robot, own, dt, rows, values)
 

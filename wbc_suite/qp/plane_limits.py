@@ -103,7 +103,11 @@ def obstacle_rows(
     """
     settings = own[:_OBSTACLES].view(OBSTACLES)[0]
     end = _OBSTACLES + _PAIR * settings.pairs
-    pairs, places, x = own[_OBSTACLES:end].view(OBSTACLE_PAIR), own[end:].view(PLANE), np.empty(3)
+    pairs, places, x = (
+        own[_OBSTACLES:end].view(OBSTACLE_PAIR),
+        own[end:].view(PLANE),
+        np.empty(3),
+    )
     for row in range(values.shape[0]):
         place, n = places[row], places[row].normal
         values[row], place.distance, joint = UNBOUNDED, np.inf, 0

@@ -215,6 +215,10 @@ class TaskStack:
         state, tick = self._state, self._tick
         return *(state[name] for name in names), tick.before, tick.targets
 
+    def target_of(self, task: Task) -> int:
+        """Return the first number of a task's target, as compiled loops write it."""
+        return self._numbers.of(task)[1] - task.target_row.values.size
+
     def prepare(self, dt: float) -> None:
         """Evaluate tasks, limits and equalities that have no kernel."""
         if not self.is_compiled:

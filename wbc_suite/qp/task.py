@@ -10,7 +10,7 @@ from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.limit import joint_values
 from wbc_suite.qp.part import SharedRow, run_kernel
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 
 class RowTask:
@@ -72,12 +72,16 @@ class RowTask:
         """Cost of each row, [cost] per unit of the error, shape (dim,). A view."""
         return self.cost_row.values
 
-    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
+    def bind(self, configuration: Configuration) -> None:
         """Resolve names in a model. A stack calls it once.
 
         Raises:
             UnknownNameError: If the model lacks a frame or joint of this task.
         """
+
+    def support(self, configuration: Configuration) -> Indices:
+        """Return the velocity indices whose columns of J may differ from zero."""
+        return np.arange(configuration.nv)
 
     def own(self, configuration: Configuration) -> Vector:
         """Return the numbers that the kernel reads; they end with `target_row`."""

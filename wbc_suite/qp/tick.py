@@ -58,8 +58,8 @@ class TickArrays(NamedTuple):
     """What a tick reads and writes: p inequality rows, k equality rows.
 
     `levels` holds the strict levels, the first first; the last is repeated up to
-    `part.MAX_LEVELS`, so that machine code does not depend on their number. Kernels that a
-    stack does not need do nothing.
+    `part.MAX_LEVELS`, so that machine code does not depend on their number. Kernels
+    that a stack does not need do nothing.
     """
 
     place_joints: Callable[..., None]  # see `kinematics.forward`
