@@ -25,17 +25,17 @@ LEVEL = record_type(("joint", "i8"), ("axis", "f8", (3,)))
 def level_rows(robot, own, dt, rows, values) -> None:  # noqa: ANN001, compiled
     """Write `e = a x z` and J, with a in world axes: `d(e) = -J dq`."""
     level, a = own.view(LEVEL)[0], np.empty(3)
-    T, axis, joint = robot.pose[level.joint], level.axis, level.joint
+    T, axis, j = robot.pose[level.joint], level.axis, level.joint
     for i in range(3):  # poses have the rotation column by column
         a[i] = T[i] * axis[0] + T[3 + i] * axis[1] + T[6 + i] * axis[2]
     values[0], values[1], values[2] = a[1], -a[0], 0.0
-    while joint > 0:
-        first = robot.v_start[joint]
-        for col in range(first, first + robot.v_count[joint]):
+    while j > 0:  # to the root of the robot
+        joint = robot.joints[j]
+        for col in range(joint.v_start, joint.v_start + joint.v_count):
             w = robot.jacobian[col, 3:]
             for i in range(3):
                 rows[i, col] = a[2] * w[i] - a[i] * w[2]
-        joint = robot.parent[joint]
+        j = joint.parent
 
 
 class LevelTask(RowTask):

@@ -39,56 +39,62 @@ def contacts(configuration: Configuration) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(feet), np.concatenate(edges)
 
 
+def motion(
+    configuration: Configuration, v: np.ndarray, edges: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """Return X and x of `a = X y + x`, and R and r of `tau = R y + r`."""
+    model, q, k = configuration.model, configuration.q, len(edges)
+    data = model.createData()
+    M = np.triu(pin.crba(model, data, q))
+    M += np.triu(M, 1).T
+    h = pin.nonLinearEffects(model, data, q, v)
+    X, x = np.zeros((model.nv, k + model.nv - ROOT)), np.zeros(model.nv)
+    X[ROOT:, k:] = np.eye(model.nv - ROOT)
+    known = np.column_stack([edges.T[:ROOT], -M[:ROOT, ROOT:], -h[:ROOT]])
+    solved = np.linalg.solve(M[:ROOT, :ROOT], known)
+    X[:ROOT], x[:ROOT] = solved[:, :-1], solved[:, -1]
+    R = M[ROOT:] @ X
+    R[:, :k] -= edges[:, ROOT:].T
+    return X, x, R, M[ROOT:] @ x + h[ROOT:]
+
+
 def main() -> None:
     """Shift the centre of mass to the left, and print what the feet carry."""
     model = pin.buildSampleModelHumanoid()
-    q, v = pin.neutral(model), np.zeros(model.nv)
-    configuration, data = Configuration(model, q), model.createData()
+    rest, v = pin.neutral(model), np.zeros(model.nv)
+    configuration = Configuration(model, rest)
     com = ComTask(target=configuration.com + np.array([0.0, 0.02, 0.0]))
     com.bind(configuration)
-    rest, solver = q.copy(), make_solver("daqp")
-    joints = model.nv - ROOT
+    solver, moved = make_solver("daqp"), np.eye(model.nv)[ROOT:]
+    greatest, load = 0.0, np.zeros(2)
     for _ in range(200):
-        configuration.update(q)
         feet, edges = contacts(configuration)
-        M = pin.crba(model, data, q)
-        M = np.triu(M) + np.triu(M, 1).T
-        h = pin.nonLinearEffects(model, data, q, v)
-        k = len(edges)
-        # a = X y + x: the root follows from its own rows of the equations of motion
-        X, x = np.zeros((model.nv, k + joints)), np.zeros(model.nv)
-        X[ROOT:, k:] = np.eye(joints)
-        known = np.column_stack([edges.T[:ROOT], -M[:ROOT, ROOT:], -h[:ROOT]])
-        solved = np.linalg.solve(M[:ROOT, :ROOT], known)
-        X[:ROOT], x[:ROOT] = solved[:, :-1], solved[:, -1]
-        posture = pin.difference(model, q, rest)[ROOT:]
+        X, x, R, r = motion(configuration, v, edges)
+        J, posture = com.jacobian(configuration), configuration.difference(rest)
         rows = [  # Jacobian, wanted acceleration, cost
-            (feet, -30.0 * feet @ v, 100.0),
-            (J := com.jacobian(configuration), KP * com.error(configuration), 10.0),
-            (np.eye(model.nv)[ROOT:], KP * posture, 1.0),
+            (feet, -2.0 * KD * feet @ v, 100.0),
+            (J, KP * com.error(configuration) - KD * J @ v, 10.0),
+            (moved, (KP * posture - KD * v)[ROOT:], 1.0),
         ]
-        problem = Problem(k + joints, inequalities=2 * joints)
-        problem.H[:] = 1e-6 * np.eye(k + joints)
+        problem = Problem(X.shape[1], inequalities=2 * len(r))
+        problem.H[:] = 1e-6 * np.eye(problem.nv)
         for J, wanted, cost in rows:
-            damped = wanted - (KD if J is not feet else 0.0) * (J @ v)
             problem.H += cost**2 * (J @ X).T @ (J @ X)
-            problem.c -= cost**2 * (J @ X).T @ (damped - J @ x)
-        problem.lb[:k] = 0.0
-        torque, still = M[ROOT:] @ X, M[ROOT:] @ x + h[ROOT:]
-        torque[:, :k] -= edges[:, ROOT:].T
-        problem.G[:] = np.concatenate([torque, -torque])
-        problem.h[:] = np.concatenate([EFFORT - still, EFFORT + still])
-        answer = solver.solve(problem)
-        assert answer is not None
-        y = answer[0]
+            problem.c -= cost**2 * (J @ X).T @ (wanted - J @ x)
+        problem.lb[: len(edges)] = 0.0
+        problem.G[:] = np.concatenate([R, -R])
+        problem.h[:] = np.concatenate([EFFORT - r, EFFORT + r])
+        found = solver.solve(problem)
+        assert found is not None
+        y = found[0]
         v += DT * (X @ y + x)
-        q = pin.integrate(model, q, DT * v)
-    vertical = (y[:k].reshape(2, -1)).sum(axis=1)
-    print(f"left and right foot carry {vertical[0]:.0f} and {vertical[1]:.0f} N")
-    print(f"weight {9.81 * pin.computeTotalMass(model):.0f} N")
+        configuration.update(configuration.integrate(DT * v))
+        load = y[: len(edges)].reshape(2, -1).sum(axis=1)
+        greatest = max(greatest, np.abs(R @ y + r).max())
     missing = 1e3 * np.linalg.norm(com.error(configuration))
+    print(f"left and right foot carry {load[0]:.0f} and {load[1]:.0f} N")
     print(f"the centre of mass is {missing:.1f} mm from its target")
-    print(f"greatest torque {np.abs(torque @ y + still).max():.0f} N m")
+    print(f"motors gave {greatest:.0f} N m at most")
 
 
 if __name__ == "__main__":

@@ -174,6 +174,15 @@ def plain(kernel: Any) -> Any:
     return FunctionType(function.__code__, names, function.__name__)
 
 
+def record_type(*fields: tuple[Any, ...]) -> np.dtype[Any]:
+    """Return a type of records, 8 bytes a number, that kernels and Python read alike.
+
+    Args:
+        fields: Name, "f8" or "i8", and a shape where it is an array.
+    """
+    return np.dtype((np.record, list(fields)))
+
+
 def struct(fields: type[Fields]) -> type[Fields]:
     """Let kernels take a named tuple of arrays and numbers as one argument.
 

@@ -7,17 +7,17 @@ configuration.update(configuration.integrate(solution.dq))
 ```
 """
 
+from wbc_suite.compiling import record_type
 from wbc_suite.qp.com_task import ComTask
 from wbc_suite.qp.equality import Equality, FrameEquality, LinearEquality
 from wbc_suite.qp.frame_task import FrameTask, RelativeFrameTask
-from wbc_suite.qp.joint_coupling_task import JointCouplingTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
+from wbc_suite.qp.joint_tasks import DampingTask, JointCouplingTask, PostureTask
 from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, LimitKind, RowLimit
 from wbc_suite.qp.look_at_task import LookAtTask
 from wbc_suite.qp.motion import Approach, Escaping, Motion, Overshoot, Relaxed
-from wbc_suite.qp.part import SharedRow, record_type
+from wbc_suite.qp.part import SharedRow
 from wbc_suite.qp.plane_limits import FloorLimit, ObstacleLimit
-from wbc_suite.qp.posture_task import DampingTask, PostureTask
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.registry import LIMITS, TASKS, register_limit, register_task
 from wbc_suite.qp.report import (

@@ -136,8 +136,7 @@ def solve_warm(qp: QpArrays) -> bool:
         cholesky(system, size, _DEPENDENT)
         solve_lower(system, y, size)
         solve_upper(system, y, size)
-        _recover(qp, size)
-        changed = _deactivate(qp)
+        changed = _recover(qp, size)
         if not _activate(qp, count >= _QUICK) and not changed:
             return True
     side[:] = 0
@@ -193,9 +192,14 @@ def _state_system(qp: QpArrays) -> int:
 
 
 @inner
-def _recover(qp: QpArrays, size: int) -> None:
-    """Write x and the multipliers from the solution of the small system."""
-    n, m = qp.x.shape[0], qp.e.shape[0]
+def _recover(qp: QpArrays, size: int) -> bool:  # noqa: C901, one pass
+    """Write x and the multipliers from the solution of the small system.
+
+    Make inactive what has a multiplier of the wrong sign; return if there is any.
+    """
+    n, m, changed = qp.x.shape[0], qp.e.shape[0], False
+    lower, upper, wanted, weight = qp.lower, qp.upper, qp.wanted, qp.weight[0]
+    root, kept, diagonal, mu = qp.root, qp.kept, qp.diagonal, qp.mu[0]
     x, multipliers, side, last = qp.x, qp.multipliers, qp.side, qp.last
     W, rows, all_scaled = qp.W, qp.rows, qp.scaled
     multipliers[:] = 0.0
@@ -209,23 +213,13 @@ def _recover(qp: QpArrays, size: int) -> None:
             multipliers[i] -= own[i] * y
     for i in range(n):
         if side[i] == 0:
-            x[i] *= qp.root[i]
+            x[i] *= root[i]
             multipliers[i] = 0.0
         else:
-            x[i] = qp.kept[i]
-            weight = qp.diagonal[0, i] + qp.mu[0]
-            multipliers[i] += qp.diagonal[1, i] - weight * x[i]
-
-
-@inner
-def _deactivate(qp: QpArrays) -> bool:
-    """Make inactive what has a multiplier of the wrong sign; return if there is any."""
-    n, changed, side, multipliers = qp.x.shape[0], False, qp.side, qp.multipliers
-    lower, upper, wanted, weight = qp.lower, qp.upper, qp.wanted, qp.weight[0]
-    for i in range(n):
-        wrong = multipliers[i] * side[i] < 0.0
-        if wrong and lower[i] < upper[i]:
-            side[i], changed = 0, True
+            x[i] = kept[i]
+            multipliers[i] += diagonal[1, i] - (diagonal[0, i] + mu) * x[i]
+            if multipliers[i] * side[i] < 0.0 and lower[i] < upper[i]:
+                side[i], changed = 0, True
     for row in range(qp.counts[0]):
         force, state = multipliers[n + row], side[n + row]
         if state != 0 and force < 0.0:

@@ -7,13 +7,13 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_array, check_number
-from wbc_suite.compiling import inner
+from wbc_suite.compiling import inner, record_type
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, pack_pose
 from wbc_suite.qp.frame_task import homogeneous, relative_rotation
 from wbc_suite.qp.lie import is_usable, log3, saturate
-from wbc_suite.qp.part import SharedRow, place_frame, record_type, run_kernel
+from wbc_suite.qp.part import SharedRow, place_frame, run_kernel
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
 
 Direction = Literal["x", "y", "z", "roll", "pitch", "yaw"]
@@ -39,20 +39,21 @@ def hold_frame(
     """Write the kept rows of `J_local dq = gain e`, see `FrameEquality`."""
     T, error, held = np.empty(12), np.empty(6), own.view(HELD)[0]
     drift(robot, held, T, error)
-    finite, gain, columns = True, held.gain, robot.jacobian
+    finite, gain = True, held.gain
+    columns, joints = robot.jacobian, robot.joints
     for i in range(6):
         error[i] *= gain
         finite &= bool(np.isfinite(error[i]))
     saturate(error[:3], _RETURN_SPEED * dt)
     saturate(error[3:], _RETURN_ANGULAR_SPEED * dt)
     for row in range(values.shape[0]):
-        direction, joint = held.directions[row], held.joint
+        direction, j = held.directions[row], held.joint
         values[row] = error[direction] if finite and gain > 0.0 else 0.0
         k = 3 * (direction % 3)
         x, y, z = T[k], T[k + 1], T[k + 2]
-        while joint > 0:
-            first = robot.v_start[joint]
-            for col in range(first, first + robot.v_count[joint]):
+        while j > 0:
+            joint = joints[j]
+            for col in range(joint.v_start, joint.v_start + joint.v_count):
                 J = columns[col]
                 if direction >= 3:
                     speed = x * J[3] + y * J[4] + z * J[5]
@@ -61,7 +62,7 @@ def hold_frame(
                     speed += y * (J[1] + J[5] * T[9] - J[3] * T[11])
                     speed += z * (J[2] + J[3] * T[10] - J[4] * T[9])
                 rows[row, col] = speed
-            joint = robot.parent[joint]
+            j = joint.parent
 
 
 @inner

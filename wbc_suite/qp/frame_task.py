@@ -6,12 +6,12 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_array
-from wbc_suite.compiling import inner
+from wbc_suite.compiling import inner, record_type
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, pack_pose
 from wbc_suite.qp.lie import LARGEST_FINITE, inverse_left_jacobian, is_usable, log3
-from wbc_suite.qp.part import SharedRow, place_frame, record_type
+from wbc_suite.qp.part import SharedRow, place_frame
 from wbc_suite.qp.task import RowTask, cost_vector
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -43,10 +43,10 @@ def frame_error(
         error[i] = target[4 * i + 3] - T[9 + i]
         for j in range(3):  # A = Jl^-1 R^T maps world rates
             A[i, j] = E[i, 0] * T[j] + E[i, 1] * T[3 + j] + E[i, 2] * T[6 + j]
-    columns, parents = robot.jacobian, robot.parent
-    v_start, v_count, joint = robot.v_start, robot.v_count, frame.joint
-    while joint > 0:
-        for col in range(v_start[joint], v_start[joint] + v_count[joint]):
+    columns, joints, j = robot.jacobian, robot.joints, frame.joint
+    while j > 0:
+        joint = joints[j]
+        for col in range(joint.v_start, joint.v_start + joint.v_count):
             J = columns[col]
             x, y, z = J[3], J[4], J[5]
             rows[0, col] = J[0] + y * T[11] - z * T[10]
@@ -54,7 +54,7 @@ def frame_error(
             rows[2, col] = J[2] + x * T[10] - y * T[9]
             for i in range(3):
                 rows[3 + i, col] = A[i, 0] * x + A[i, 1] * y + A[i, 2] * z
-        joint = parents[joint]
+        j = joint.parent
     if not finite:
         error[:] = np.nan
 

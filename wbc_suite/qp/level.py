@@ -9,9 +9,9 @@ import numpy as np
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.qp.constraints import Constraints, with_rows
+from wbc_suite.qp.joint_tasks import posture_error
 from wbc_suite.qp.limit import unlimited_bounds
 from wbc_suite.qp.part import STATE, Kernels, Numbers, kernel_of
-from wbc_suite.qp.posture_task import posture_error
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.task import JointTask, RowTask, Task
 from wbc_suite.qp.task_rows import TASK, LevelArrays

@@ -3,15 +3,15 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from enum import IntEnum
-from typing import Any, ClassVar, TypeAlias, cast
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc_suite.compiling import inner
+from wbc_suite.compiling import inner, record_type
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.configuration import named_joints
-from wbc_suite.qp.part import record_type, run_kernel
+from wbc_suite.qp.part import run_kernel
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
 
 
@@ -116,7 +116,7 @@ BOUND = record_type(
 """Limits of the joint of one velocity."""
 
 
-class JointBounds(np.recarray[Any, np.dtype[np.record]]):
+class JointBounds(np.recarray[Any, np.dtype[np.record]]):  # pyright: ignore[reportIncompatibleVariableOverride]
     """Limits of joints, one entry per velocity, which a stack's limits fill in.
 
     Fields are those of `BOUND`; each is a view of shape (nv,).
@@ -133,13 +133,13 @@ class JointBounds(np.recarray[Any, np.dtype[np.record]]):
 
 def unlimited_bounds(configuration: Configuration) -> JointBounds:
     """Return infinite bounds."""
-    bounds = cast("JointBounds", np.zeros(configuration.nv, BOUND).view(JointBounds))
-    bounds.q_index = -1
+    bounds = np.zeros(configuration.nv, BOUND).view(JointBounds)
+    bounds.q_index[:] = -1
     for _, joint in named_joints(configuration.model):
         if joint.nq == 1 and joint.nv == 1:
             bounds.q_index[joint.idx_v] = joint.idx_q
-    bounds.q_lower = -np.inf
-    bounds.position_gain = 1.0
+    bounds.q_lower[:] = -np.inf
+    bounds.position_gain[:] = 1.0
     for values in (bounds.q_upper, bounds.v_max, bounds.a_max, bounds.step_max):
         values[:] = np.inf
     return bounds

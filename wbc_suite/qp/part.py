@@ -22,7 +22,7 @@ from weakref import ref
 import numpy as np
 
 from wbc_suite import logs
-from wbc_suite.compiling import by_address, compiled, inner, struct
+from wbc_suite.compiling import by_address, compiled, inner, record_type, struct
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics.forward import (
     RobotArrays,
@@ -39,15 +39,6 @@ MOST_LIMITS = 8
 """Limits with a kernel in one stack."""
 MAX_LEVELS = 6
 """Strict levels of one stack."""
-
-
-def record_type(*fields: tuple[Any, ...]) -> np.dtype[Any]:
-    """Return a type of records, 8 bytes a number, that kernels and Python read alike.
-
-    Args:
-        fields: Name, "f8" or "i8", and a shape where it is an array.
-    """
-    return np.dtype((np.record, list(fields)))
 
 
 PART = record_type(
@@ -83,10 +74,12 @@ STATE = record_type(
 class PartArrays(NamedTuple):
     """Kernels and numbers of a stack's parts."""
 
+    robot: RobotArrays
     kernels: tuple[Callable[..., None], ...]
     own: tuple[Vector, ...]  # of tasks and equalities, then of each limit
     rows: CompiledRecords  # `PART` of each limit and equality
     state: CompiledRecords  # (1,) `STATE`
+    x: Vector  # (nv,), output: the step
 
 
 @inner

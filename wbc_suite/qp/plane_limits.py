@@ -7,11 +7,11 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_count, check_number
-from wbc_suite.compiling import inner
+from wbc_suite.compiling import inner, record_type
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.qp.limit import LimitKind, RowLimit
-from wbc_suite.qp.part import joined, place_point, record_type
+from wbc_suite.qp.part import joined, place_point
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.qp.self_collision_limit import LinkPair
 from wbc_suite.qp.self_collision_rows import (
@@ -20,7 +20,7 @@ from wbc_suite.qp.self_collision_rows import (
     insert_nearest,
     write_approach,
 )
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import CompiledRecords, Matrix, Vector
 
 FLOOR = record_type(
     ("spheres", "i8"),  # n
@@ -68,9 +68,10 @@ def floor_rows(
     Own are `FLOOR`, n `SPHERE` and k `ROW` records. Rows get the negative derivative of
     the height of each; values get how far it may come down in dt seconds, m.
     """
-    floor, end = own[:_FLOOR].view(FLOOR)[0], own.shape[0]
+    floor = own[:_FLOOR].view(FLOOR)[0]
     last = _FLOOR + _SPHERE * floor.spheres
-    spheres, places = own[_FLOOR:last].view(SPHERE), own[last:end].view(ROW)
+    spheres: CompiledRecords = own[_FLOOR:last].view(SPHERE)
+    places = own[last:].view(ROW)
     found, distance, count = places["found"], places["distance"], 0
     x, up, poses = np.empty(3), np.zeros(3), robot.pose
     up[2] = 1.0
@@ -130,7 +131,7 @@ def write_point_row(
         out[col] = 0.0
     while joint > 0:
         write_approach(robot, joint, x, n, -1.0, out)
-        joint = robot.parent[joint]
+        joint = robot.joints[joint].parent
 
 
 class FloorLimit(RowLimit):

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from wbc_suite.compiling import inner
+from wbc_suite.compiling import inner, record_type
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.linear_algebra import copy_vector
-from wbc_suite.qp.part import place_point, record_type
+from wbc_suite.qp.part import place_point
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
 
@@ -199,14 +199,14 @@ def _write_row(
         norm = max(np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2), _TOUCHING)
     for i in range(3):
         n[i] /= norm
-    parents, first, second = robot.parent, a.joint, b.joint
+    joints, first, second = robot.joints, a.joint, b.joint
     while first != second:  # up to the joint that moves both
         if first > second:  # parents have smaller numbers
             write_approach(robot, first, x, n, -1.0, out)
-            first = parents[first]
+            first = joints[first].parent
         else:
             write_approach(robot, second, y, n, 1.0, out)
-            second = parents[second]
+            second = joints[second].parent
 
 
 @inner
@@ -214,8 +214,8 @@ def write_approach(
     robot: RobotArrays, joint: int, x: Vector, n: Vector, sign: float, out: Vector
 ) -> None:
     """Write the speed of a point x along n, times a sign, per unit of a joint's v."""
-    columns, first = robot.jacobian, robot.v_start[joint]
-    for col in range(first, first + robot.v_count[joint]):
+    columns, own = robot.jacobian, robot.joints[joint]
+    for col in range(own.v_start, own.v_start + own.v_count):
         out[col] = sign * speed_along(columns[col], n, x[0], x[1], x[2])
 
 

@@ -164,7 +164,7 @@ class TaskStack:
         state["curvature"] = self.curvature_damping
         state["warm"] = self.solver == "daqp" if warm is None else warm
         addresses = kernels.addresses(robot)
-        parts = PartArrays(addresses, tuple(own), records, state)
+        parts = PartArrays(robot, addresses, tuple(own), records, state, results["x"])
         levels = tuple(as_argument(level.arrays) for level in self.levels)
         all_levels = (*levels, *levels[-1:] * (MAX_LEVELS - len(levels)))
         return TickArrays(

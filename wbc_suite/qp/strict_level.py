@@ -3,7 +3,6 @@
 import numpy as np
 
 from wbc_suite.compiling import inner
-from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.linear_algebra import copy_rows, dot, row_space, subtract_projection
 from wbc_suite.qp.part import PartArrays
 from wbc_suite.qp.problem import UNBOUNDED
@@ -17,12 +16,7 @@ _RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
 
 @inner
 def restrict_level(
-    robot: RobotArrays,
-    parts: PartArrays,
-    levels: tuple[LevelArrays, ...],
-    k: int,
-    x: Vector,
-    dt: float,
+    parts: PartArrays, levels: tuple[LevelArrays, ...], k: int, dt: float
 ) -> bool:
     """State that level k may move in ways that all levels above rate like their step.
 
@@ -30,7 +24,7 @@ def restrict_level(
     all rows above. x, the step of the level above, is one of them, so the problem has a
     solution. Return True.
     """
-    level, first, nv = levels[k], levels[0].qp, x.shape[0]
+    level, first, x, nv = levels[k], levels[0].qp, parts.x, parts.x.shape[0]
     qp, p, count = level.qp, first.counts[0], first.counts[1]
     above, rows = level.above, qp.rows
     copy_rows(first.rows[p : p + count], above)

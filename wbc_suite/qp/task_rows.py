@@ -4,12 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import inner, struct
-from wbc_suite.kinematics.forward import RobotArrays
+from wbc_suite.compiling import inner, record_type, struct
 from wbc_suite.linear_algebra import copy_rows
 from wbc_suite.qp.active_set import QpArrays
 from wbc_suite.qp.lie import LARGEST_FINITE
-from wbc_suite.qp.part import PartArrays, record_type
+from wbc_suite.qp.part import PartArrays
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
 
 TASK = record_type(
@@ -51,7 +50,6 @@ class LevelArrays(NamedTuple):
 
 @inner
 def write_tasks(
-    robot: RobotArrays,
     parts: PartArrays,
     level: LevelArrays,
     dt: float,
@@ -68,7 +66,7 @@ def write_tasks(
     current.
     """
     mu, total, diagonal, tasks = damping, 0.0, level.qp.diagonal, level.tasks
-    state = parts.state[0]
+    state, robot = parts.state[0], parts.robot
     errors, jacobians, own, kernels = (
         level.error,
         level.jacobian,

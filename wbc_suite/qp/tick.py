@@ -8,7 +8,7 @@ says so in `state.taken`, and calls `solve_tick` again for the levels below.
 
 from collections.abc import Callable
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -32,6 +32,10 @@ _GROWTH = 0.2  # of all damping, that one such tick adds
 _FADING = 0.05  # s, in which the damping falls to 1 / e while targets move
 _REST = 0.3  # of the time of rest, which is added to that
 _MOST = 1e6  # times the stiffest joint's cost
+
+
+Levels: TypeAlias = tuple[LevelArrays, ...]
+"""The strict levels of a stack, the first first."""
 
 
 class TickStatus(IntEnum):
@@ -72,7 +76,7 @@ class TickArrays(NamedTuple):
     press: Callable[..., bool]  # `press_rows`
     robot: RobotArrays  # its q is where the tick begins
     parts: PartArrays
-    levels: tuple[LevelArrays, ...]
+    levels: Levels
     bounds: CompiledRecords  # (nv,) `limit.BOUND`
     kinds: Indices  # (2 nv,), output: `LimitKind` of each lower, then each upper bound
     v: Vector  # (nv,), in and out: velocity of the last step
@@ -84,7 +88,7 @@ class TickArrays(NamedTuple):
 def bind_kernels(
     robot: RobotArrays,
     parts: PartArrays,
-    levels: tuple[LevelArrays, ...],
+    levels: Levels,
     qp: QpArrays,
     *,
     has_rows: bool,
@@ -100,12 +104,11 @@ def bind_kernels(
         has_rows: Whether there are limits or equalities with rows.
         is_strict: Whether there are several levels.
     """
-    arguments = robot, parts, levels, 1, np.zeros(1), 0.0
 
     def step(kernel: Any, is_used: bool) -> Any:
-        return by_address(kernel if is_used else do_nothing, *arguments)
+        return by_address(kernel if is_used else do_nothing, parts, levels, 1, 0.0)
 
-    tasks = robot, parts, levels[0], 0.0, 0.0, 0.0
+    tasks = parts, levels[0], 0.0, 0.0, 0.0
     return {
         "place_joints": by_address(compute_joint_poses, robot),
         "write_tasks": by_address(write_tasks, *tasks),
@@ -119,14 +122,7 @@ def bind_kernels(
 
 
 @inner
-def do_nothing(
-    robot: RobotArrays,
-    parts: PartArrays,
-    levels: tuple[LevelArrays, ...],
-    k: int,
-    x: Vector,
-    dt: float,
-) -> bool:
+def do_nothing(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
     """Return True: the stack does not need this."""
     return True
 
@@ -138,7 +134,7 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
     Return a `TickStatus`, and the level at which it ended. The step is then in `tick.x`
     and `tick.v`.
     """
-    robot, parts, levels, x, v = tick.robot, tick.parts, tick.levels, tick.x, tick.v
+    parts, levels, x, v = tick.parts, tick.levels, tick.x, tick.v
     state = parts.state[0]
     if start == 0:
         if not state.prepared:
@@ -146,21 +142,21 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
         state.prepared = state.alone
         if not _begin_tick(tick, state, levels[0].qp, dt):
             return TickStatus.BAD_POSITION.value, 0
-        tick.place_joints(robot)
-        tick.write_rows(robot, parts, levels, 0, x, dt)
+        tick.place_joints(tick.robot)
+        tick.write_rows(parts, levels, 0, dt)
         _damp_overshoot(tick, state, levels[0].qp.mu[0], dt)
     elif state.taken != Taken.NOT:
         _take(tick, levels, state.solved, dt)
     for k in range(start, state.levels):
         damping = state.damping + state.pressure_damping + state.overshoot_damping
         if k > 0:
-            tick.restrict(robot, parts, levels, k, x, dt)
+            tick.restrict(parts, levels, k, dt)
             damping = levels[k - 1].qp.mu[0]
-        if not tick.write_tasks(robot, parts, levels[k], dt, damping, state.curvature):
+        if not tick.write_tasks(parts, levels[k], dt, damping, state.curvature):
             return TickStatus.BAD_ROWS.value, k
-        tick.weigh(robot, parts, levels, k, x, dt)
+        tick.weigh(parts, levels, k, dt)
         is_solved = state.warm and tick.solve(levels[k].qp)
-        if not is_solved or not tick.keep(robot, parts, levels, k, x, dt):
+        if not is_solved or not tick.keep(parts, levels, k, dt):
             return TickStatus.UNSOLVED.value, k
         state.taken = Taken.BY_KERNEL.value
         _take(tick, levels, k, dt)
@@ -186,11 +182,11 @@ def _begin_tick(
 
 
 @inner
-def _take(tick: TickArrays, levels: tuple[LevelArrays, ...], k: int, dt: float) -> None:
+def _take(tick: TickArrays, levels: Levels, k: int, dt: float) -> None:
     """Take the solution of level k as the step."""
     tick.parts.state[0].solved = k + 1
     copy_vector(levels[k].qp.x, tick.x)
-    tick.press(tick.robot, tick.parts, levels, k, tick.x, dt)
+    tick.press(tick.parts, levels, k, dt)
 
 
 @inner
@@ -236,14 +232,7 @@ def turned(v: float, before: float, change: float) -> bool:
 
 
 @inner
-def write_rows(
-    robot: RobotArrays,
-    parts: PartArrays,
-    levels: tuple[LevelArrays, ...],
-    k: int,
-    x: Vector,
-    dt: float,
-) -> bool:
+def write_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
     """Write the rows of limits and equalities that have a kernel; relax all limits.
 
     A row outside its limit, h < 0, does not bind to come back, or rows could demand
@@ -251,12 +240,13 @@ def write_rows(
     robot that stands is never asked to move. Far outside it may be relaxed further,
     see `RowLimit.relax_speed`. Return True.
     """
-    qp, nv, own, kernels = levels[0].qp, x.shape[0], parts.own, parts.kernels
+    qp, nv, own, kernels = levels[0].qp, parts.x.shape[0], parts.own, parts.kernels
     rows, upper, lower, soft = qp.rows, qp.upper[nv:], qp.lower[nv:], qp.wanted
     for t in range(parts.rows.shape[0]):
         part = parts.rows[t]
-        row, end, numbers = part.row, part.end, own[part.own][part.first : part.last]
-        kernels[part.kernel](robot, numbers, dt, rows[row:end], upper[row:end])
+        row, end = part.row, part.end
+        numbers: Vector = own[part.own][part.first : part.last]
+        kernels[part.kernel](parts.robot, numbers, dt, rows[row:end], upper[row:end])
         for i in range(row, end):
             wanted = upper[i]
             if np.isnan(part.relax_speed):  # an equality
@@ -269,28 +259,14 @@ def write_rows(
 
 
 @inner
-def weigh_rows(
-    robot: RobotArrays,
-    parts: PartArrays,
-    levels: tuple[LevelArrays, ...],
-    k: int,
-    x: Vector,
-    dt: float,
-) -> bool:
+def weigh_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
     """Write the cost of soft rows, which the first level has. Return True."""
     levels[k].qp.weight[0] = RETURN_WEIGHT * stiffness(levels[k].qp)
     return True
 
 
 @inner
-def keep_rows(
-    robot: RobotArrays,
-    parts: PartArrays,
-    levels: tuple[LevelArrays, ...],
-    k: int,
-    x: Vector,
-    dt: float,
-) -> bool:
+def keep_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
     """Return whether the solution of level k keeps all rows.
 
     Those are its own and the first level's: rows longer than 1 are more sensitive than
@@ -326,14 +302,7 @@ def _violation(x: Vector, qp: QpArrays) -> float:
 
 
 @inner
-def press_rows(
-    robot: RobotArrays,
-    parts: PartArrays,
-    levels: tuple[LevelArrays, ...],
-    k: int,
-    x: Vector,
-    dt: float,
-) -> bool:
+def press_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
     """Let rows that tasks press against damp the next tick.
 
     The damping is `sum |nu| max|A|` over the rows A that tasks press on with forces nu.
@@ -344,13 +313,13 @@ def press_rows(
     """
     qp, state = levels[0].qp, parts.state[0]
     if state.taken != Taken.BY_KERNEL:
-        state.residual = _violation(x, qp)
+        state.residual = _violation(parts.x, qp)
     if k > 0:
         return True
     state.pressure_damping *= np.exp(-dt / _PRESSURE_MEMORY)
     if state.taken == Taken.RELAXED:
         return True
-    n, greatest, total = x.shape[0], 0.0, 0.0
+    n, greatest, total = parts.x.shape[0], 0.0, 0.0
     rows, W, e, diagonal = qp.rows, qp.W, qp.e, qp.diagonal
     forces = qp.multipliers[n:]
     for row in range(qp.counts[0] + qp.counts[1]):
