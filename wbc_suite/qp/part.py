@@ -38,7 +38,7 @@ MOST_KERNELS = 8
 MOST_LIMITS = 8
 """Limits with a kernel in one stack."""
 MAX_LEVELS = 6
-"""Strict levels of one stack."""
+"""Strict levels of one stack; so many tuples have, whether or not they are used."""
 
 
 PART = record_type(
@@ -72,7 +72,7 @@ STATE = record_type(
 
 @struct
 class PartArrays(NamedTuple):
-    """Kernels and numbers of a stack's parts."""
+    """A stack's parts with their kernels, and its levels."""
 
     robot: RobotArrays
     kernels: tuple[Callable[..., None], ...]
@@ -80,6 +80,7 @@ class PartArrays(NamedTuple):
     rows: CompiledRecords  # `PART` of each limit and equality
     state: CompiledRecords  # (1,) `STATE`
     x: Vector  # (nv,), output: the step
+    levels: tuple[Any, ...]  # `task_rows.LevelArrays`, the last up to `MAX_LEVELS`
 
 
 @inner

@@ -164,21 +164,29 @@ class TaskStack:
         state["curvature"] = self.curvature_damping
         state["warm"] = self.solver == "daqp" if warm is None else warm
         addresses = kernels.addresses(robot)
-        parts = PartArrays(robot, addresses, tuple(own), records, state, results["x"])
         levels = tuple(as_argument(level.arrays) for level in self.levels)
-        all_levels = (*levels, *levels[-1:] * (MAX_LEVELS - len(levels)))
+        levels += levels[-1:] * (MAX_LEVELS - len(levels))
+        parts = PartArrays(
+            robot=robot,
+            kernels=addresses,
+            own=tuple(own),
+            rows=records,
+            state=state,
+            x=results["x"],
+            levels=levels,
+        )
+        kernels_of_tick = bind_kernels(
+            robot,
+            as_argument(parts),
+            levels[0],
+            as_argument(self.levels[0].qp),
+            has_rows=len(records) > 0,
+            is_strict=len(self.levels) > 1,
+        )
         return TickArrays(
-            **bind_kernels(
-                robot,
-                as_argument(parts),
-                all_levels,
-                as_argument(self.levels[0].qp),
-                has_rows=len(records) > 0,
-                is_strict=len(levels) > 1,
-            ),
+            **kernels_of_tick,
             robot=robot,
             parts=parts,
-            levels=all_levels,
             bounds=np.asarray(self.bounds),
             kinds=np.zeros(2 * self.configuration.nv, dtype=np.int64),
             v=results["v"],

@@ -7,7 +7,7 @@ from wbc_suite.linear_algebra import copy_rows, dot, row_space, subtract_project
 from wbc_suite.qp.part import PartArrays
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.qp.task_rows import LevelArrays
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Matrix
 
 _LOST_DIRECTION = 0.05  # share of a unit vector outside the present basis
 _SINGULAR = 2e-2  # shortest over longest row, under which a singularity is near
@@ -15,16 +15,15 @@ _RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
 
 
 @inner
-def restrict_level(
-    parts: PartArrays, levels: tuple[LevelArrays, ...], k: int, dt: float
-) -> bool:
+def restrict_level(parts: PartArrays, k: int, dt: float) -> bool:
     """State that level k may move in ways that all levels above rate like their step.
 
     Those are `V dq = V x`, where V is an orthonormal basis of the equality rows and of
     all rows above. x, the step of the level above, is one of them, so the problem has a
     solution. Return True.
     """
-    level, first, x, nv = levels[k], levels[0].qp, parts.x, parts.x.shape[0]
+    levels, x, nv = parts.levels, parts.x, parts.x.shape[0]
+    level, first = levels[k], levels[0].qp
     qp, p, count = level.qp, first.counts[0], first.counts[1]
     above, rows = level.above, qp.rows
     copy_rows(first.rows[p : p + count], above)

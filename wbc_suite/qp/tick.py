@@ -8,7 +8,7 @@ says so in `state.taken`, and calls `solve_tick` again for the levels below.
 
 from collections.abc import Callable
 from enum import IntEnum
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,10 +34,6 @@ _REST = 0.3  # of the time of rest, which is added to that
 _MOST = 1e6  # times the stiffest joint's cost
 
 
-Levels: TypeAlias = tuple[LevelArrays, ...]
-"""The strict levels of a stack, the first first."""
-
-
 class TickStatus(IntEnum):
     """How `solve_tick` ended."""
 
@@ -61,9 +57,7 @@ class Taken(IntEnum):
 class TickArrays(NamedTuple):
     """What a tick reads and writes: p inequality rows, k equality rows.
 
-    `levels` holds the strict levels, the first first; the last is repeated up to
-    `part.MAX_LEVELS`, so that machine code does not depend on their number. Kernels
-    that a stack does not need do nothing.
+    Kernels that a stack does not need do nothing.
     """
 
     place_joints: Callable[..., None]  # see `kinematics.forward`
@@ -76,7 +70,6 @@ class TickArrays(NamedTuple):
     press: Callable[..., bool]  # `press_rows`
     robot: RobotArrays  # its q is where the tick begins
     parts: PartArrays
-    levels: Levels
     bounds: CompiledRecords  # (nv,) `limit.BOUND`
     kinds: Indices  # (2 nv,), output: `LimitKind` of each lower, then each upper bound
     v: Vector  # (nv,), in and out: velocity of the last step
@@ -88,7 +81,7 @@ class TickArrays(NamedTuple):
 def bind_kernels(
     robot: RobotArrays,
     parts: PartArrays,
-    levels: Levels,
+    level: LevelArrays,
     qp: QpArrays,
     *,
     has_rows: bool,
@@ -99,16 +92,16 @@ def bind_kernels(
     Args:
         robot: The robot, as kernels get it.
         parts: Tasks, limits and equalities, as kernels get them.
-        levels: All levels, as kernels get them.
-        qp: The problem of one, as kernels get it.
+        level: The first level, as kernels get it.
+        qp: Its problem, as kernels get it.
         has_rows: Whether there are limits or equalities with rows.
         is_strict: Whether there are several levels.
     """
 
     def step(kernel: Any, is_used: bool) -> Any:
-        return by_address(kernel if is_used else do_nothing, parts, levels, 1, 0.0)
+        return by_address(kernel if is_used else do_nothing, parts, 1, 0.0)
 
-    tasks = parts, levels[0], 0.0, 0.0, 0.0
+    tasks = parts, level, 0.0, 0.0, 0.0
     return {
         "place_joints": by_address(compute_joint_poses, robot),
         "write_tasks": by_address(write_tasks, *tasks),
@@ -122,7 +115,7 @@ def bind_kernels(
 
 
 @inner
-def do_nothing(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
+def do_nothing(parts: PartArrays, k: int, dt: float) -> bool:
     """Return True: the stack does not need this."""
     return True
 
@@ -134,8 +127,8 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
     Return a `TickStatus`, and the level at which it ended. The step is then in `tick.x`
     and `tick.v`.
     """
-    parts, levels, x, v = tick.parts, tick.levels, tick.x, tick.v
-    state = parts.state[0]
+    parts, x, v = tick.parts, tick.x, tick.v
+    levels, state = parts.levels, parts.state[0]
     if start == 0:
         if not state.prepared:
             return TickStatus.NEEDS_PYTHON.value, 0
@@ -143,23 +136,23 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
         if not _begin_tick(tick, state, levels[0].qp, dt):
             return TickStatus.BAD_POSITION.value, 0
         tick.place_joints(tick.robot)
-        tick.write_rows(parts, levels, 0, dt)
+        tick.write_rows(parts, 0, dt)
         _damp_overshoot(tick, state, levels[0].qp.mu[0], dt)
     elif state.taken != Taken.NOT:
-        _take(tick, levels, state.solved, dt)
+        _take(tick, state.solved, dt)
     for k in range(start, state.levels):
         damping = state.damping + state.pressure_damping + state.overshoot_damping
         if k > 0:
-            tick.restrict(parts, levels, k, dt)
+            tick.restrict(parts, k, dt)
             damping = levels[k - 1].qp.mu[0]
         if not tick.write_tasks(parts, levels[k], dt, damping, state.curvature):
             return TickStatus.BAD_ROWS.value, k
-        tick.weigh(parts, levels, k, dt)
+        tick.weigh(parts, k, dt)
         is_solved = state.warm and tick.solve(levels[k].qp)
-        if not is_solved or not tick.keep(parts, levels, k, dt):
+        if not is_solved or not tick.keep(parts, k, dt):
             return TickStatus.UNSOLVED.value, k
         state.taken = Taken.BY_KERNEL.value
-        _take(tick, levels, k, dt)
+        _take(tick, k, dt)
     for i in range(x.shape[0]):
         v[i] = x[i] / dt
     return TickStatus.SOLVED.value, state.levels
@@ -182,11 +175,12 @@ def _begin_tick(
 
 
 @inner
-def _take(tick: TickArrays, levels: Levels, k: int, dt: float) -> None:
+def _take(tick: TickArrays, k: int, dt: float) -> None:
     """Take the solution of level k as the step."""
-    tick.parts.state[0].solved = k + 1
-    copy_vector(levels[k].qp.x, tick.x)
-    tick.press(tick.parts, levels, k, dt)
+    parts = tick.parts
+    parts.state[0].solved = k + 1
+    copy_vector(parts.levels[k].qp.x, parts.x)
+    tick.press(parts, k, dt)
 
 
 @inner
@@ -232,7 +226,7 @@ def turned(v: float, before: float, change: float) -> bool:
 
 
 @inner
-def write_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
+def write_rows(parts: PartArrays, k: int, dt: float) -> bool:
     """Write the rows of limits and equalities that have a kernel; relax all limits.
 
     A row outside its limit, h < 0, does not bind to come back, or rows could demand
@@ -240,7 +234,8 @@ def write_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
     robot that stands is never asked to move. Far outside it may be relaxed further,
     see `RowLimit.relax_speed`. Return True.
     """
-    qp, nv, own, kernels = levels[0].qp, parts.x.shape[0], parts.own, parts.kernels
+    qp, nv, own = parts.levels[0].qp, parts.x.shape[0], parts.own
+    kernels = parts.kernels
     rows, upper, lower, soft = qp.rows, qp.upper[nv:], qp.lower[nv:], qp.wanted
     for t in range(parts.rows.shape[0]):
         part = parts.rows[t]
@@ -259,20 +254,22 @@ def write_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
 
 
 @inner
-def weigh_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
+def weigh_rows(parts: PartArrays, k: int, dt: float) -> bool:
     """Write the cost of soft rows, which the first level has. Return True."""
-    levels[k].qp.weight[0] = RETURN_WEIGHT * stiffness(levels[k].qp)
+    qp = parts.levels[k].qp
+    qp.weight[0] = RETURN_WEIGHT * stiffness(qp)
     return True
 
 
 @inner
-def keep_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
+def keep_rows(parts: PartArrays, k: int, dt: float) -> bool:
     """Return whether the solution of level k keeps all rows.
 
     Those are its own and the first level's: rows longer than 1 are more sensitive than
     their orthonormal basis.
     """
-    first, qp, own, state = levels[0].qp, levels[k].qp, 0.0, parts.state[0]
+    levels, own, state = parts.levels, 0.0, parts.state[0]
+    first, qp = levels[0].qp, levels[k].qp
     if k > 0:
         own = _violation(qp.x, qp)
     state.residual = _violation(qp.x, first)
@@ -302,7 +299,7 @@ def _violation(x: Vector, qp: QpArrays) -> float:
 
 
 @inner
-def press_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
+def press_rows(parts: PartArrays, k: int, dt: float) -> bool:
     """Let rows that tasks press against damp the next tick.
 
     The damping is `sum |nu| max|A|` over the rows A that tasks press on with forces nu.
@@ -311,7 +308,7 @@ def press_rows(parts: PartArrays, levels: Levels, k: int, dt: float) -> bool:
     would grow for ever: a multiple of what the tasks pull with is the most. Return
     True.
     """
-    qp, state = levels[0].qp, parts.state[0]
+    qp, state = parts.levels[0].qp, parts.state[0]
     if state.taken != Taken.BY_KERNEL:
         state.residual = _violation(parts.x, qp)
     if k > 0:
