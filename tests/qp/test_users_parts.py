@@ -341,14 +341,21 @@ class WithKernel:
 class CompiledHeight(WithKernel, RowTask):
     """`HeightTask` with a kernel."""
 
-    __init__ = HeightTask.__init__
+    def __init__(self, frame, height, **options):
+        super().__init__(f"height of {frame}", dim=1, **options)
+        self.frame, self.height = frame, height
 
 
 class CompiledCeiling(WithKernel, RowLimit):
     """`CeilingLimit` with a kernel."""
 
     dim = 1
-    __init__, subject = CeilingLimit.__init__, CeilingLimit.subject
+
+    def __init__(self, frame, height):
+        self.frame, self.height = frame, height
+
+    def subject(self, row):
+        return f"{self.frame} below {self.height:g} m"
 
 
 class CompiledShelf(WithKernel, Equality):

@@ -16,20 +16,20 @@ import logging
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 from weakref import ref
 
 import numpy as np
 
 from wbc_suite import logs
-from wbc_suite.compiling import by_address, compiled, inner, record_type, struct
+from wbc_suite.compiling import by_address, compiled, inner, record_type
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics.forward import (
     RobotArrays,
     compute_joint_poses,
     multiply_poses,
 )
-from wbc_suite.typing import CompiledRecords, Matrix, Records, Vector
+from wbc_suite.typing import Matrix, Records, Vector
 
 LOG = logs.logger(__name__)
 
@@ -42,8 +42,8 @@ MAX_LEVELS = 6
 
 
 PART = record_type(
-    ("kernel", "i8"),  # place in `PartArrays.kernels`; 0 does nothing
-    ("own", "i8"),  # place in `PartArrays.own`
+    ("kernel", "i8"),  # place in `task_rows.PartArrays.kernels`; 0 does nothing
+    ("own", "i8"),  # place in its `own`
     ("first", "i8"),  # its numbers are own[first:last]
     ("last", "i8"),
     ("row", "i8"),  # its rows, of limits before those of equalities
@@ -68,19 +68,6 @@ STATE = record_type(
     ("curvature", "f8"),  # factor of damping by errors, see `task_rows.write_tasks`
 )
 """Numbers of a tick."""
-
-
-@struct
-class PartArrays(NamedTuple):
-    """A stack's parts with their kernels, and its levels."""
-
-    robot: RobotArrays
-    kernels: tuple[Callable[..., None], ...]
-    own: tuple[Vector, ...]  # of tasks and equalities, then of each limit
-    rows: CompiledRecords  # `PART` of each limit and equality
-    state: CompiledRecords  # (1,) `STATE`
-    x: Vector  # (nv,), output: the step
-    levels: tuple[Any, ...]  # `task_rows.LevelArrays`, the last up to `MAX_LEVELS`
 
 
 @inner

@@ -113,7 +113,7 @@ def obstacle_rows(
         place, n = places[row], places[row].normal
         values[row], place.distance, joint = UNBOUNDED, np.inf, 0
         if place.found >= 0:
-            pair = pairs[place.found]
+            pair: CompiledRecords = pairs[place.found]
             joint = pair.joint
             place_point(robot.pose[joint], place.point, x)
             place.distance = n[0] * x[0] + n[1] * x[1] + n[2] * x[2] - place.offset

@@ -23,7 +23,6 @@ from wbc_suite.qp.part import (
     STATE,
     Kernels,
     Numbers,
-    PartArrays,
     log_python_parts,
 )
 from wbc_suite.qp.problem import Problem
@@ -31,6 +30,7 @@ from wbc_suite.qp.report import TaskReport, TickRecord
 from wbc_suite.qp.solution import Fallback, Solution
 from wbc_suite.qp.solver import make_solver
 from wbc_suite.qp.task import Task
+from wbc_suite.qp.task_rows import PartArrays
 from wbc_suite.qp.tick import (
     TOLERANCE,
     Taken,

@@ -4,9 +4,8 @@ import numpy as np
 
 from wbc_suite.compiling import inner
 from wbc_suite.linear_algebra import copy_rows, dot, row_space, subtract_projection
-from wbc_suite.qp.part import PartArrays
 from wbc_suite.qp.problem import UNBOUNDED
-from wbc_suite.qp.task_rows import LevelArrays
+from wbc_suite.qp.task_rows import LevelArrays, PartArrays
 from wbc_suite.typing import Matrix
 
 _LOST_DIRECTION = 0.05  # share of a unit vector outside the present basis

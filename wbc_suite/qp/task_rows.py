@@ -1,14 +1,15 @@
 """Weighted rows of the tasks of one level, compiled."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from wbc_suite.compiling import inner, record_type, struct
+from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.linear_algebra import copy_rows
 from wbc_suite.qp.active_set import QpArrays
 from wbc_suite.qp.lie import LARGEST_FINITE
-from wbc_suite.qp.part import PartArrays
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
 
 TASK = record_type(
@@ -46,6 +47,19 @@ class LevelArrays(NamedTuple):
     above: Matrix  # (m, nv), scratch: rows of all levels above and of the equalities
     kept: Matrix  # (nv, nv), basis of what they decided at the last tick
     kept_counts: Indices  # (2,), its size, and the greatest rank so far
+
+
+@struct
+class PartArrays(NamedTuple):
+    """A stack's parts with their kernels, and its levels."""
+
+    robot: RobotArrays
+    kernels: tuple[Callable[..., None], ...]
+    own: tuple[Vector, ...]  # of tasks and equalities, then of each limit
+    rows: CompiledRecords  # `PART` of each limit and equality
+    state: CompiledRecords  # (1,) `STATE`
+    x: Vector  # (nv,), output: the step
+    levels: tuple[LevelArrays, ...]  # the last is repeated up to `MAX_LEVELS`
 
 
 @inner

@@ -17,10 +17,9 @@ from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.qp.active_set import QpArrays, solve_warm
 from wbc_suite.qp.limit import merge_bounds
-from wbc_suite.qp.part import PartArrays
 from wbc_suite.qp.problem import UNBOUNDED, worst_violation
 from wbc_suite.qp.strict_level import restrict_level
-from wbc_suite.qp.task_rows import LevelArrays, write_tasks
+from wbc_suite.qp.task_rows import LevelArrays, PartArrays, write_tasks
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
 
 TOLERANCE = 1e-7  # m or rad; a step that violates a row or bound by more is not taken
@@ -240,7 +239,7 @@ def write_rows(parts: PartArrays, k: int, dt: float) -> bool:
     for t in range(parts.rows.shape[0]):
         part = parts.rows[t]
         row, end = part.row, part.end
-        numbers: Vector = own[part.own][part.first : part.last]
+        numbers = own[int(part.own)][part.first : part.last]
         kernels[part.kernel](parts.robot, numbers, dt, rows[row:end], upper[row:end])
         for i in range(row, end):
             wanted = upper[i]
