@@ -33,7 +33,7 @@ from wbc_suite.typing import Matrix, Records, Vector
 
 LOG = logs.logger(__name__)
 
-MOST_KERNELS = 8
+MOST_KERNELS = 12
 """Kinds of kernels in one stack: so many addresses have the same type."""
 MOST_LIMITS = 8
 """Limits with a kernel in one stack."""
