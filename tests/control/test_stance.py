@@ -9,13 +9,9 @@ from textbook_laws import textbook
 
 from wbc_suite.control import load_composite_controller_config
 from wbc_suite.control.dynamics.arrays import EDGES
-from wbc_suite.control.dynamics.qp_bounds import (
-    FORCE_COST,
-    LEAST_FORCE,
-    MOTION_COST,
-    STRONGEST,
-)
-from wbc_suite.control.dynamics.qp_rows import CONTACT
+from wbc_suite.control.dynamics.friction import FOOT_LOAD_MAX, STANCE_FORCE_MIN
+from wbc_suite.control.dynamics.qp_bounds import FORCE_COST, MOTION_COST
+from wbc_suite.control.dynamics.qp_rows import STANCE_FOOT
 from wbc_suite.locomotion.gait import GRAVITY
 
 ROBOTS = ("Spot", "SpotWithArm", "GR1FreeBody")
@@ -119,9 +115,9 @@ class Truth:
         kp = np.repeat(state["stiffness"], 3)
         of_root = wanted[:6] + kp * e[:6] + 2.0 * np.sqrt(kp) * e_rate[:6]
         of_joints = wanted + kp[0] * e + 2.0 * np.sqrt(kp[0]) * e_rate
-        settling = -CONTACT[1] * self.J @ self.data.qvel[self.dofs]
-        rows = [CONTACT[0] * np.hstack([self.J, np.zeros((len(self.J), edges))])]
-        right = [CONTACT[0] * (settling - self.drift)]
+        settling = -STANCE_FOOT[1] * self.J @ self.data.qvel[self.dofs]
+        rows = [STANCE_FOOT[0] * np.hstack([self.J, np.zeros((len(self.J), edges))])]
+        right = [STANCE_FOOT[0] * (settling - self.drift)]
         com = np.hstack([np.zeros((3, size)), self.forces / self.mass])
         rows.append(state["com_weight"] * com)
         momentum = self.M[:3] @ of_joints + self.h[:3]
@@ -139,8 +135,8 @@ class Truth:
         low, high = body.limits[3] - self.h[6:], body.limits[4] - self.h[6:]
         counts = np.repeat(np.diff(body.first_edge), np.diff(body.first_edge))
         bound = np.r_[np.full(size, np.inf), np.full(edges, 0.0)]
-        bound[size:] = STRONGEST * self.mass * GRAVITY / EDGES
-        least = np.r_[np.full(size, -np.inf), LEAST_FORCE / counts]
+        bound[size:] = FOOT_LOAD_MAX * self.mass * GRAVITY / EDGES
+        least = np.r_[np.full(size, -np.inf), STANCE_FORCE_MIN / counts]
         x = qpsolvers.solve_qp(
             H,
             -W.T @ b,
@@ -170,7 +166,7 @@ def test_the_answer_is_the_optimum_of_the_stated_qp(alone, name):
             continue
         found += 1
         a, y = expected
-        limited += int((y < 1.01 * LEAST_FORCE / 4).any())
+        limited += int((y < 1.01 * STANCE_FORCE_MIN / 4).any())
         scale = 1.0 + np.abs(a).max()
         np.testing.assert_allclose(body.terms.a, a, atol=1e-4 * scale)
         np.testing.assert_allclose(body.qp.x[: len(y)], y, atol=1e-3 * y.max())
@@ -196,7 +192,7 @@ def test_torques_and_contact_forces_move_the_robot_as_asked(alone, name):
         if not scene.controller.standing.fallback:
             assert (tau <= body.limits[4] + 1e-6).all()
             assert (tau >= body.limits[3] - 1e-6).all()
-        settling = -CONTACT[1] * truth.J @ data.qvel[body.dofs]
+        settling = -STANCE_FOOT[1] * truth.J @ data.qvel[body.dofs]
         slip = truth.J @ body.terms.a + truth.drift - settling
         assert np.abs(slip).max() < 0.02 * (1.0 + np.abs(body.terms.a).max())
 

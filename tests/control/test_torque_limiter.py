@@ -3,7 +3,11 @@ import pinocchio as pin
 import pytest
 
 from wbc_suite.control.composite.reduced_robot import lock_groups
-from wbc_suite.control.composite.torque_limiter import MIN_SHARE, SHARE, TorqueLimiter
+from wbc_suite.control.composite.torque_limiter import (
+    CHANGE_SHARE_MIN,
+    EFFORT_SHARE,
+    TorqueLimiter,
+)
 from wbc_suite.kinematics import Configuration
 from wbc_suite.robot import load_robot
 
@@ -68,7 +72,7 @@ def test_no_motor_is_asked_for_more_than_it_has(robot, configuration):
             continue
         slowed += 1
         # Coriolis terms change a little with the velocity that is given up.
-        assert got.max() < SHARE + 0.03
+        assert got.max() < EFFORT_SHARE + 0.03
     assert slowed > 20
 
 
@@ -79,7 +83,9 @@ def test_a_weak_motor_slows_its_own_joint_alone(robot, configuration):
     neck = index(configuration, "head_pitch_joint")
     got = torque(configuration, np.zeros_like(v), found)[neck]
     assert found[neck] < -0.005
-    assert got == pytest.approx(SHARE * efforts(robot, configuration)[neck], rel=0.01)
+    assert got == pytest.approx(
+        EFFORT_SHARE * efforts(robot, configuration)[neck], rel=0.01
+    )
     np.testing.assert_array_equal(np.delete(found, neck), np.delete(v, neck))
 
 
@@ -96,7 +102,7 @@ def test_all_joints_are_slowed_where_one_could_not_stop(robot, configuration):
     found = guard_of(robot, configuration).apply(before, v, DT)
     change = (found - before)[v != before] / (v - before)[v != before]
     np.testing.assert_allclose(change, change[0], rtol=1e-9)  # the same direction
-    assert MIN_SHARE <= change[0] < 0.5
+    assert CHANGE_SHARE_MIN <= change[0] < 0.5
 
 
 def test_slowed_joints_stay_within_their_limits(robot, configuration):

@@ -21,9 +21,8 @@ Sources: MuJoCo documentation, "Computation: floating objects"; Pinocchio's
 `JointModelFreeFlyer`. Each statement is tested numerically against both engines.
 """
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 
@@ -31,11 +30,13 @@ from wbc_suite.errors import DescriptionError, UnknownNameError
 from wbc_suite.kinematics.configuration import named_joints
 from wbc_suite.typing import Indices, Matrix, Vector
 
-_Q_ORDER = {
-    int(mujoco.mjtJoint.mjJNT_FREE): [0, 1, 2, 4, 5, 6, 3],
-    int(mujoco.mjtJoint.mjJNT_BALL): [1, 2, 3, 0],
-}
-"""Where Pinocchio's parameters of a joint stand among MuJoCo's; [0] for the others."""
+if TYPE_CHECKING:
+    import mujoco  # QP stacks over a Pinocchio model need no simulator
+
+_Q_ORDER = {7: [0, 1, 2, 4, 5, 6, 3], 4: [1, 2, 3, 0]}
+"""Where Pinocchio's parameters of a free joint (7) or a ball (4) stand in MuJoCo's."""
+_PARAMETERS = 7, 4, 1, 1
+"""Of a joint of each MuJoCo type: free, ball, slide, hinge."""
 
 
 class _FreeJoint(NamedTuple):
@@ -62,7 +63,7 @@ class Conversion:
 
     def __init__(
         self,
-        mujoco_model: mujoco.MjModel,
+        mujoco_model: "mujoco.MjModel",
         pinocchio_model: pin.Model,
         *,
         prefix: str = "",
@@ -78,7 +79,7 @@ class Conversion:
             k = names[prefix + name]
             q0 = int(mujoco_model.jnt_qposadr[k])
             v0 = int(mujoco_model.jnt_dofadr[k])
-            order = _Q_ORDER.get(mujoco_model.jnt_type[k], [0])
+            order = _Q_ORDER.get(_PARAMETERS[mujoco_model.jnt_type[k]], [0])
             if (joint.nq, joint.nv) != (len(order), max(1, len(order) - 1)):
                 raise DescriptionError(
                     f"Joint '{name}' has {joint.nq} parameters and {joint.nv} "
@@ -160,6 +161,8 @@ class Conversion:
 
 def _rotation(qpos: Vector, free: _FreeJoint) -> Matrix:
     """Return the rotation matrix of a free joint, body to world, shape (3, 3)."""
+    import mujoco
+
     out = np.empty(9)
     mujoco.mju_quat2Mat(out, qpos[free.quaternion])
     return out.reshape(3, 3)

@@ -4,10 +4,10 @@ from wbc_suite.compiling import compiled
 from wbc_suite.locomotion.gait import Plan
 from wbc_suite.typing import Vector
 
-BEYOND = 0.004
+TOUCHDOWN_DEPTH = 0.004
 """m; feet swing to so far under the ground, so that they touch it in time."""
 
-LANDED = 0.95
+HORIZONTAL_SHARE = 0.95
 """Part of the swing after which a foot moves on its goal's vertical only."""
 
 
@@ -44,8 +44,8 @@ def write_swing(
         duration: Of the whole swing, s.
     """
     p, v, a = plan.position[foot], plan.velocity[foot], plan.acceleration[foot]
-    T = LANDED * duration
-    blend, rate, curve = minimum_jerk(s / LANDED)
+    T = HORIZONTAL_SHARE * duration
+    blend, rate, curve = minimum_jerk(s / HORIZONTAL_SHARE)
     for i in range(2):
         way = goal[i] - lift[i]
         p[i], v[i], a[i] = lift[i] + blend * way, rate * way / T, curve * way / T**2
@@ -55,5 +55,5 @@ def write_swing(
         low, way = lift[2], ground + apex - lift[2]
     else:
         blend, rate, curve = minimum_jerk(2.0 * s - 1.0)
-        low, way = ground + apex, -apex - BEYOND
+        low, way = ground + apex, -apex - TOUCHDOWN_DEPTH
     p[2], v[2], a[2] = low + blend * way, rate * way / T, curve * way / T**2

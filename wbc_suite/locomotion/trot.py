@@ -21,19 +21,19 @@ from wbc_suite.typing import Vector
 
 _STAND, _STEP = int(Mode.STAND), int(Mode.STEP)
 
-RECOVERY = 2.0
+RECOVERY_TIME = 2.0
 """s for which a robot steps that was pushed."""
 
-SLIPPING = 0.15
+SLIP_SPEED = 0.15
 """m/s; a standing foot that is faster has lost its hold."""
 
-LOADING = 0.03
+LOADING_TIME = 0.03
 """s in which a foot takes over its load, and leaves it."""
 
-SETTLING = 0.3
+SETTLING_TIME = 0.3
 """s after the reset, and after the last step, in which feet may slip."""
 
-LEASH = 0.1
+REFERENCE_LEAD_MAX = 0.1
 """m; the reference is not farther from the centre of mass."""
 
 STANDING_GAINS = (60.0, 20.0)
@@ -41,7 +41,7 @@ STEPPING_GAINS = (10.0, 8.0)
 HEIGHT_GAINS = (150.0, 24.0)
 """1/s^2 and 1/s."""
 
-GREATEST = 12.0
+COM_ACCELERATION_MAX = 12.0
 """m/s^2; acceleration of the centre of mass."""
 
 
@@ -77,7 +77,9 @@ def plan_trot(
         kp = STEPPING_GAINS[0] if stepping else STANDING_GAINS[0]
         kd = STEPPING_GAINS[1] if stepping else STANDING_GAINS[1]
         a = kp * (state.reference[i] - com[i]) + kd * (wanted[i] - velocity[i])
-        plan.com_acceleration[i] = min(max(a, -GREATEST), GREATEST)
+        plan.com_acceleration[i] = min(
+            max(a, -COM_ACCELERATION_MAX), COM_ACCELERATION_MAX
+        )
         lever = state.height / GRAVITY
         plan.zmp[i] = com[i] - lever * plan.com_acceleration[i]
     error = state.ground + state.height - com[2]
@@ -89,7 +91,7 @@ def _move_reference(reference: Vector, wanted: Vector, com: Vector, dt: float) -
     """Move the reference of the centre of mass, on a leash."""
     x = reference[0] + wanted[0] * dt - com[0]
     y = reference[1] + wanted[1] * dt - com[1]
-    share = min(1.0, LEASH / max(np.sqrt(x * x + y * y), 1e-12))
+    share = min(1.0, REFERENCE_LEAD_MAX / max(np.sqrt(x * x + y * y), 1e-12))
     reference[0], reference[1] = com[0] + share * x, com[1] + share * y
 
 
@@ -120,11 +122,11 @@ def _switch_mode(gait: Gait, measured: Measured, moving: bool, margin: float) ->
     speed = np.sqrt(v[0] ** 2 + v[1] ** 2)
     if state.mode == _STAND:
         pushed = margin < settings.margin or speed > settings.speed
-        settled = state.time > state.since + SETTLING
+        settled = state.time > state.since + SETTLING_TIME
         for k in range(measured.slip.shape[0]):
-            pushed = pushed or (settled and measured.slip[k] > SLIPPING)
-        if pushed and state.time > SETTLING and settings.recover > 0.0:
-            state.until = state.time + RECOVERY
+            pushed = pushed or (settled and measured.slip[k] > SLIP_SPEED)
+        if pushed and state.time > SETTLING_TIME and settings.recover > 0.0:
+            state.until = state.time + RECOVERY_TIME
         if moving or state.time < state.until:
             state.mode, state.phase = _STEP, 0.0
         return
@@ -146,7 +148,7 @@ def _plan_feet(gait: Gait, measured: Measured, wanted: Vector, plan: Plan) -> No
         phase = (state.phase + gait.offset[k]) % 1.0
         if state.mode == _STAND or phase < settings.duty:
             left = stance - phase * settings.period
-            load = min(phase * settings.period, left) / LOADING + 0.2
+            load = min(phase * settings.period, left) / LOADING_TIME + 0.2
             plan.load[k] = 1.0 if state.mode == _STAND else min(1.0, load)
             gait.swings[k], standing = 0, standing + 1
             ground += measured.foot[k, 2]

@@ -28,34 +28,34 @@ from wbc_suite.typing import Vector
 
 _STAND, _STEP = int(Mode.STAND), int(Mode.STEP)
 
-RECOVERY = 1.6
+RECOVERY_TIME = 1.6
 """s for which a robot steps that was pushed."""
 
-SETTLING = 0.5
+SETTLING_TIME = 0.5
 """s after the reset in which the robot does not step by itself."""
 
-SHIFTING = 0.6
+SHIFT_TIME = 0.6
 """s in which the weight shifts to the first foot."""
 
-CLOSE = 0.015
+START_DISTANCE = 0.015
 """m; distance of the DCM from where a walk begins; it grows while the robot waits."""
 
-OUTSIDE = 0.01
+STEP_OVERSHOOT = 0.01
 """m; how far the DCM leaves the soles before the robot steps by itself."""
 
-DISTURBED = 0.06
+PUSH_DISTANCE = 0.06
 """m; distance of the DCM from its reference at which a walk counts as pushed."""
 
-FIXED_GAIN = 20.0
+NO_STEP_GAIN = 20.0
 """1/s; feedback on the DCM of a robot that may not step."""
 
-COMMITTED = 0.06
+COMMIT_TIME = 0.06
 """s before the landing at which place and time of a step are fixed."""
 
-FIXED = 0.85
+FIXED_SHARE = 0.85
 """Part of the swing after which the place is fixed."""
 
-LANDED, SINKING, LATEST = 0.012, 0.1, 0.1
+LANDED_HEIGHT, LANDING_SPEED, LANDING_DELAY_MAX = 0.012, 0.1, 0.1
 """m, m/s, s; a step waits for a foot that is higher and sinks faster, for so long."""
 
 CANDIDATES = 9
@@ -123,7 +123,7 @@ def _stand(
     middle = wanted.copy()
     if moving:
         _, own, _ = _periodic_step(gait, omega, state.stance)
-        state.shift = min(1.0, state.shift + dt / SHIFTING)
+        state.shift = min(1.0, state.shift + dt / SHIFT_TIME)
         gap = 0.0
         for i in range(2):
             start = measured.foot[state.stance, i] + own[i]
@@ -131,19 +131,19 @@ def _stand(
             gap += (dcm[i] - wanted[i]) ** 2
         if state.shift >= 1.0:
             state.waiting += dt
-            if np.sqrt(gap) < CLOSE + 0.05 * state.waiting:
+            if np.sqrt(gap) < START_DISTANCE + 0.05 * state.waiting:
                 _begin_step(gait, state.stance, 0.0)
     else:
-        state.shift = max(0.0, state.shift - dt / SHIFTING)
+        state.shift = max(0.0, state.shift - dt / SHIFT_TIME)
     plan.margin[0] = keep_in_soles(gait, measured, dcm, -1, inside)
-    pushed = plan.margin[0] < -OUTSIDE and settings.recover > 0.0
-    if pushed and state.time > SETTLING:
+    pushed = plan.margin[0] < -STEP_OVERSHOOT and settings.recover > 0.0
+    if pushed and state.time > SETTLING_TIME:
         side = 0.0
         for i in range(2):
             side += R[i, 1] * (dcm[i] - middle[i])
-        state.until = state.time + RECOVERY
+        state.until = state.time + RECOVERY_TIME
         _begin_step(gait, 1 if side > 0.0 else 0, settings.double_support)
-    gain = settings.gain if settings.recover > 0.0 else FIXED_GAIN
+    gain = settings.gain if settings.recover > 0.0 else NO_STEP_GAIN
     for i in range(2):
         zmp[i] = dcm[i] + gain / omega * (dcm[i] - wanted[i])
     if settings.recover > 0.0:
@@ -193,11 +193,11 @@ def _step(
         error = dcm[i] - foot - own[i] * growth
         far += error**2
         wanted[i] = foot + (1.0 + settings.gain / omega) * error
-    if np.sqrt(far) > DISTURBED:
+    if np.sqrt(far) > PUSH_DISTANCE:
         state.until = max(state.until, state.time + 0.5)
     keep_in_soles(gait, measured, wanted, -1 if both else stance, zmp)
     plan.margin[0] = keep_in_soles(gait, measured, dcm, -1 if both else stance, wanted)
-    if state.since < state.duration - COMMITTED:
+    if state.since < state.duration - COMMIT_TIME:
         _choose_duration(gait, measured, dcm, zmp, landing, omega, both)
     if both:
         left = 1.0 - state.since / settings.double_support
@@ -215,9 +215,9 @@ def _has_landed(gait: Gait, measured: Measured) -> bool:
     """Return whether the weight may go to the foot that swings, or has to."""
     state = gait.state[0]
     swing, stance = measured.foot[1 - state.stance], measured.foot[state.stance]
-    late = state.since - state.duration > LATEST
-    rests = measured.rise[1 - state.stance] > -SINKING
-    return bool(late or rests or swing[2] - stance[2] < LANDED)
+    late = state.since - state.duration > LANDING_DELAY_MAX
+    rests = measured.rise[1 - state.stance] > -LANDING_SPEED
+    return bool(late or rests or swing[2] - stance[2] < LANDED_HEIGHT)
 
 
 @inner
@@ -234,7 +234,7 @@ def _swing(gait: Gait, measured: Measured, goal: Vector, dt: float, plan: Plan) 
     state.progress += min(1.0, dt / left) * (1.0 - state.progress)
     s = min(1.0, state.progress)
     duration = min(max(left / max(1.0 - s + 1e-3, 1e-2), 0.15), 1.0)
-    if s < FIXED:
+    if s < FIXED_SHARE:
         gait.goal[swing, 0], gait.goal[swing, 1] = goal[0], goal[1]
     plan.load[swing] = 0.0
     plan.yaw[swing] = state.yaw + state.velocity[2] * left
@@ -325,7 +325,7 @@ def _choose_duration(
 ) -> None:
     """Choose the step time: little out of reach, no fast swing, little change."""
     state, settings = gait.state[0], gait.settings[0]
-    first = max(state.since + COMMITTED, settings.shortest)
+    first = max(state.since + COMMIT_TIME, settings.shortest)
     goal, best, swing = np.empty(2), np.inf, measured.foot[1 - state.stance]
     for k in range(CANDIDATES):
         duration = first + (settings.step - first) * k / (CANDIDATES - 1)

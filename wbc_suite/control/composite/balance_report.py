@@ -13,7 +13,7 @@ import pinocchio as pin
 from wbc_suite.control.composite.ik_report import contacts_of
 from wbc_suite.control.composite.whole_body_dynamics_config import WholeBodyIDConfig
 from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
-from wbc_suite.control.dynamics.qp_rows import EDGE
+from wbc_suite.control.dynamics.qp_rows import SUPPORT_MARGINS
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.reasons import InMotion, LazyReasons, Reason
 from wbc_suite.control.state import RobotState
@@ -181,7 +181,7 @@ class BalanceReport:
             state.model.body(i).name.removeprefix(state.prefix) for i in self._links
         ]
         found: list[Reason] = [*contacts_of(state, except_links=feet)]
-        if own.plan.margin[0] < EDGE[0]:
+        if own.plan.margin[0] < SUPPORT_MARGINS[0]:
             found.append(SUPPORT)
         return partial(self._explain, k, qpos, tau, moving, found)
 

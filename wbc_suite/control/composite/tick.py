@@ -43,7 +43,7 @@ _FIRST_LEVEL: int = np.int64(0)  # pyright: ignore[reportAssignmentType]
 """Typed, since a literal would be compiled once more."""
 
 
-class Stage(IntEnum):
+class TickStage(IntEnum):
     """Where a tick is."""
 
     DONE = 0
@@ -58,7 +58,7 @@ class Stage(IntEnum):
 
 TICK = np.dtype(
     [
-        ("stage", "i8"),  # `Stage`
+        ("stage", "i8"),  # `TickStage`
         ("event", "i8"),  # `Event` of the planner
         ("status", "i8"),  # `TickStatus` of the QP
         ("level", "i8"),  # at which it ended
@@ -114,8 +114,8 @@ def run_tick(
 ) -> bool:
     """Run a tick as far as it needs no Python; return whether it is done.
 
-    See `Stage` where it is not. `qpos` and `qvel` are measured in the simulation, laws
-    and drives are the records of the loop.
+    See `TickStage` where it is not. `qpos` and `qvel` are measured in the simulation,
+    laws and drives are the records of the loop.
     """
     state, qp, robot = tick.state[0], tick.qp, tick.qp.robot
     law = tick.joint_law
@@ -126,7 +126,7 @@ def run_tick(
     place_fingers(tick.fingers)
     state.event = watch_progress(tick.progress, robot, tick.frames, tick.v)
     if state.event != Event.NONE:
-        state.stage = Stage.PLAN.value
+        state.stage = TickStage.PLAN.value
         return False
     record_state(tick.progress, robot, tick.v)
     approach_goals(tick.progress, robot, tick.frames, tick.posture)
@@ -134,15 +134,15 @@ def run_tick(
     copy_vector(tick.v, qp.v)
     state.status, state.level = solve_tick(qp, tick.progress.dt, _FIRST_LEVEL)
     if state.status != TickStatus.SOLVED:
-        state.stage = Stage.SOLVE.value
+        state.stage = TickStage.SOLVE.value
         return False
     if not motors_suffice(tick.motors, robot, tick.v, qp.v, tick.progress.dt):
-        state.stage = Stage.LIMIT.value
+        state.stage = TickStage.LIMIT.value
         return False
     copy_vector(qp.v, tick.v)
     extend_spline(tick.spline, tick.v)
     set_reference(laws[law : law + 1], own, tick.spline.motion)
-    state.stage, state.countdown = Stage.DONE.value, tick.steps
+    state.stage, state.countdown = TickStage.DONE.value, tick.steps
     return True
 
 

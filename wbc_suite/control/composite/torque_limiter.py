@@ -17,10 +17,10 @@ from wbc_suite.kinematics.inverse_dynamics import (
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-SHARE = 0.95  # of the effort; the rest is for tracking errors
-MIN_SHARE = 0.2  # of a change of velocity; so much is commanded in any case
-ROUNDS = 3  # in which further motors may saturate
-SLACK = 1e-9  # N m or N
+EFFORT_SHARE = 0.95  # of the effort; the rest is for tracking errors
+CHANGE_SHARE_MIN = 0.2  # of a change of velocity; so much is commanded in any case
+SATURATION_ROUNDS = 3  # in which further motors may saturate
+TORQUE_TOLERANCE = 1e-9  # N m or N
 
 
 @struct
@@ -92,7 +92,7 @@ class TorqueLimiter:
     ) -> None:
         self._configuration = configuration
         self._data = configuration.model.createData()
-        self._most = SHARE * _efforts(robot, configuration)
+        self._most = EFFORT_SHARE * _efforts(robot, configuration)
         self._arrays = TorqueArrays(
             inertias=as_argument(inertia_arrays(configuration.model)),
             max_torque=self._most,
@@ -131,7 +131,7 @@ class TorqueLimiter:
         M = np.triu(M) + np.triu(M, 1).T
         saturated = np.zeros(len(v), dtype=bool)
         torque, change = tau, self._still
-        for _ in range(ROUNDS):
+        for _ in range(SATURATION_ROUNDS):
             saturated |= np.abs(torque) > self._most
             if (np.abs(rest) >= self._most)[saturated].any():
                 return None
@@ -143,7 +143,7 @@ class TorqueLimiter:
             if (change * tau > 0.0).any():
                 return None  # one of them would be faster than asked
             torque = tau + M @ change
-            if (np.abs(torque) <= self._most + SLACK).all():
+            if (np.abs(torque) <= self._most + TORQUE_TOLERANCE).all():
                 found = v + dt * change
                 return found if self._can_stop(found, v) else None
         return None
@@ -162,7 +162,7 @@ class TorqueLimiter:
         # Motors that cannot hold the joint have no margin; the others decide.
         asked = (np.abs(tau) > self._most) & (np.abs(rest) < self._most)
         share = (margin[asked] / np.abs(change[asked])).min(initial=1.0)
-        return max(float(share), MIN_SHARE)
+        return max(float(share), CHANGE_SHARE_MIN)
 
 
 def _efforts(robot: RobotDescription, configuration: Configuration) -> Vector:

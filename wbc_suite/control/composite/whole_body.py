@@ -24,7 +24,7 @@ from wbc_suite.control.composite.reduced_robot import (
 )
 from wbc_suite.control.composite.scene_obstacles import SceneObstacles
 from wbc_suite.control.composite.stack_backend import StackBackend
-from wbc_suite.control.composite.tick import TICK, Stage, WholeBodyArrays
+from wbc_suite.control.composite.tick import TICK, TickStage, WholeBodyArrays
 from wbc_suite.control.composite.waypoint_planner import Waypoint, WaypointPlanner
 from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
@@ -218,7 +218,7 @@ class WholeBodyIK:
         """Hold the robot where it is."""
         self._configuration.update(self._conversion.q_to_pinocchio(state.data.qpos))
         self._reference.reset()
-        self._state["stage"], self._state["countdown"] = Stage.DONE_IN_PYTHON, 0
+        self._state["stage"], self._state["countdown"] = TickStage.DONE_IN_PYTHON, 0
         motion, held = self._reference.motion, state.data.qpos[self._held_index]
         motion[0, motion.shape[1] - len(held) :] = held
         poses = [self.frames.pose(k) for k in range(len(self.config.frames))]
@@ -287,9 +287,9 @@ class WholeBodyIK:
         """Finish a tick that the control loop has begun, if there is one."""
         tick, backend = self._state[0], self._backend
         stage = int(tick["stage"])
-        if stage in (Stage.DONE, Stage.DONE_IN_PYTHON):
+        if stage in (TickStage.DONE, TickStage.DONE_IN_PYTHON):
             return
-        if stage == Stage.PLAN:
+        if stage == TickStage.PLAN:
             self._follow(self._planner.respond(int(tick["event"]), backend.v))
         else:
             backend.solve(self._dt, (int(tick["status"]), int(tick["level"])))
@@ -310,7 +310,7 @@ class WholeBodyIK:
         """Move the commanded robot as solved, and hand the spline to the laws."""
         self._reference.extend(self._backend.v)
         self._law.aim(*self._reference.motion)
-        self._state["stage"] = Stage.DONE_IN_PYTHON
+        self._state["stage"] = TickStage.DONE_IN_PYTHON
 
     @property
     def hold_action(self) -> Vector:
@@ -340,7 +340,7 @@ class WholeBodyIK:
         goals, stage = self._goals.in_world(), self._state["stage"][0]
         corrected = self._corrected(goals, state)
         commanded = Commanded(self.q, corrected, self.joint_targets)
-        answer = self._backend.last_step(in_loop=stage == Stage.DONE)
+        answer = self._backend.last_step(in_loop=stage == TickStage.DONE)
         frames = self._report.frames(state, goals, answer, commanded)
         reached = all(report["reached"] for report in frames.values())
         return {"ik": {"reached": reached, "frames": frames}}

@@ -15,7 +15,7 @@ from wbc_suite.control.composite.whole_body_dynamics_config import (
     read_dynamics,
 )
 from wbc_suite.control.dynamics.arrays import (
-    Stage,
+    QpStage,
     make_dynamics,
     memory_of,
     plan_nothing,
@@ -283,9 +283,9 @@ class WholeBodyID:
     def finish_tick(self) -> None:
         """Solve the QP if the loop has stated it and not found its active set."""
         record = self.dynamics.state[0]
-        if record["stage"] == Stage.UNSOLVED:
+        if record["stage"] == QpStage.UNSOLVED:
             self.fallback = self._fallback.solve(self.dynamics.qp)
-            record["stage"] = Stage.SOLVED
+            record["stage"] = QpStage.SOLVED
 
     @property
     def heading(self) -> pin.SE3:

@@ -22,10 +22,10 @@ from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 
-class Stage(IntEnum):
+class QpStage(IntEnum):
     """Where a tick is."""
 
-    STATED = 0
+    WRITTEN = 0
     """Not begun: the last answer is written."""
     SOLVED = 1
     UNSOLVED = 2
@@ -45,7 +45,7 @@ STATE = np.dtype(
         ("friction", "f8"),  # coefficient
         ("dt", "f8"),  # s between two steps of the loop
         ("trust", "f8"),  # part of measured velocities' errors corrected in a step
-        ("stage", "i8"),  # `Stage`
+        ("stage", "i8"),  # `QpStage`
         ("ticks", "i8"),
         ("unsolved", "i8"),  # ticks whose active set was not found
         ("fell", "f8"),  # time of the fall, s since the reset; negative before

@@ -1,11 +1,11 @@
-"""Costs of forces and postures, and bounds of forces, accelerations and torques."""
+"""Costs of forces and postures, and bounds of accelerations and torques."""
 
 import numpy as np
 
 from wbc_suite.compiling import inner
-from wbc_suite.control.dynamics.arrays import EDGES, WholeBodyDynamics
+from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
+from wbc_suite.control.dynamics.friction import bound_edge_forces
 from wbc_suite.control.loop.physics import Physics
-from wbc_suite.locomotion.gait import GRAVITY
 
 POSTURE_KP = 50.0
 """1/s^2."""
@@ -16,17 +16,11 @@ FORCE_COST = 1e-3
 MOTION_COST = 1e-6
 """(s^2/rad)^2; least cost of an acceleration."""
 
-LEAST_FORCE = 4.0
-"""N; normal force that a standing foot keeps."""
-
-STRONGEST = 10.0
-"""Weights that a foot may carry."""
-
-WINDOW = (400.0, 40.0, 20.0, 200.0)
+LIMIT_GAINS = (400.0, 40.0, 20.0, 200.0)
 """kp (1/s^2) and kd (1/s) of positions, kp (1/s) of velocities, and the deceleration
 with which limits are kept that are passed already, rad/s^2."""
 
-FASTEST = 1e4
+ACCELERATION_MAX = 1e4
 """rad/s^2."""
 
 
@@ -34,7 +28,7 @@ FASTEST = 1e4
 def write_bounds(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write the diagonal cost, and all bounds."""
     _write_costs(physics, body)
-    _bound_forces(body)
+    bound_edge_forces(body)
     _bound_accelerations(physics, body)
     _bound_torques(body)
 
@@ -61,31 +55,13 @@ def _write_costs(physics: Physics, body: WholeBodyDynamics) -> None:
 
 
 @inner
-def _bound_forces(body: WholeBodyDynamics) -> None:
-    """Bound the forces along edges by the load that a foot may carry."""
-    qp, state, plan = body.qp, body.state[0], body.plan
-    for k in range(body.site.shape[0]):
-        first, last = body.first_edge[k], body.first_edge[k + 1]
-        weight = state.mass * GRAVITY
-        load = plan.load[k]
-        most = weight * (STRONGEST if load >= 1.0 else 1.3 * load)
-        least = min(LEAST_FORCE, 0.5 * most)
-        for edge in range(first, last):
-            qp.lower[edge], qp.upper[edge] = least / (last - first), most / EDGES
-            if load <= 0.0:
-                qp.side[edge] = 1
-            elif qp.side[edge] > 0 and load >= 1.0:
-                qp.side[edge] = 0
-
-
-@inner
 def _bound_accelerations(physics: Physics, body: WholeBodyDynamics) -> None:
     """Bound accelerations so that joints stay within position and velocity limits.
 
     A window is never empty: where limits disagree the upper bound gives way.
     """
     qp, edges = body.qp, body.terms.B.shape[0]
-    kp, kd, kv, most = WINDOW
+    kp, kd, kv, most = LIMIT_GAINS
     for j in range(body.qpos.shape[0]):
         q, v = physics.qpos[body.qpos[j]], body.terms.v[6 + j]
         fastest = body.limits[2, j]
@@ -93,9 +69,9 @@ def _bound_accelerations(physics: Physics, body: WholeBodyDynamics) -> None:
         high = min(high, max(kv * (fastest - v), -most))
         low = min(kp * (body.limits[0, j] - q) - kd * v, most)
         low = max(low, min(kv * (-fastest - v), most))
-        low = min(max(low, -FASTEST), FASTEST - 1e-3)
+        low = min(max(low, -ACCELERATION_MAX), ACCELERATION_MAX - 1e-3)
         qp.lower[edges + j] = low
-        qp.upper[edges + j] = max(min(high, FASTEST), low + 1e-3)
+        qp.upper[edges + j] = max(min(high, ACCELERATION_MAX), low + 1e-3)
 
 
 @inner

@@ -1,52 +1,53 @@
-"""Rows, bounds and costs of the QP of whole-body inverse dynamics."""
+"""Rows of the QP of whole-body inverse dynamics: feet, balance, hands, attitude."""
 
 import numpy as np
 
 from wbc_suite.compiling import inner
 from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
+from wbc_suite.control.dynamics.friction import write_edges
 from wbc_suite.control.dynamics.qp_bounds import write_bounds
 from wbc_suite.control.dynamics.terms import (
     eliminate_root,
-    write_edges,
     write_frame_terms,
 )
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import matrix_product, rotated, rotation
+from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.locomotion.gait import Mode
 from wbc_suite.qp.lie import exp3, log3, saturate
 from wbc_suite.typing import Matrix, Vector
 
 _STEP = int(Mode.STEP)
 
-CONTACT = (100.0, 60.0)
+STANCE_FOOT = (100.0, 60.0)
 """Weight of the rows that keep a foot at rest, and their damping, 1/s."""
 
-SWING = (6.0, 2.0, 500.0)
+SWING_FOOT = (6.0, 2.0, 500.0)
 """Weights of position and orientation of a swinging foot, and kp, 1/s^2."""
 
 COM_WEIGHT = 10.0
-SPIN = (0.05, 4.0)
+ANGULAR_MOMENTUM = (0.05, 4.0)
 """Weight of angular momentum, and its decay, 1/s."""
 
-UPRIGHT = (150.0, 24.0)
+UPRIGHT_GAINS = (150.0, 24.0)
 """kp, 1/s^2, and kd, 1/s, of bodies that stay upright."""
 
 HAND_KP = 600.0
 """1/s^2."""
 
-FARTHEST = (0.015, 0.08)
+HAND_ERROR_MAX = (0.015, 0.08)
 """m and rad; errors of hands pull no harder than at these."""
 
-HELD_BACK = (0.06, 0.3)
+HAND_LEAD_MAX = (0.06, 0.3)
 """m and rad; a reference that is farther ahead leads the hand less."""
 
-RECOVERING = 0.3
+RECOVERING_HANDS = 0.3
 """Part of the hands' weights while a robot recovers from a push."""
 
-EDGE = (0.02, 0.07)
+SUPPORT_MARGINS = (0.02, 0.07)
 """m; margins of the capture point between which attitude, height and hands yield."""
 
-YIELDING = 0.05
+YIELDING_ATTITUDE = 0.05
 """Part of the weights of attitude and angular momentum that remains then: the trunk
 turns to keep the centre of mass over the feet."""
 
@@ -55,7 +56,7 @@ YIELDING_HEIGHT, YIELDING_HANDS = 0.1, 0.1
 
 
 @inner
-def state_qp(physics: Physics, body: WholeBodyDynamics) -> None:
+def write_qp(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write the QP of a tick; terms and plan are those of the tick."""
     for k in range(body.site.shape[0]):
         _write_foot_jacobian(physics, body, k)
@@ -121,20 +122,20 @@ def _add_foot(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
         log3(R_error, turn)
     if body.rolls[k] == 1:
         _free_roll(physics, body, k, turn)
-    kd = 2.0 * np.sqrt(SWING[2])
+    kd = 2.0 * np.sqrt(SWING_FOOT[2])
     for i in range(count):
         wanted = -terms.drift[i]
         if stands:
-            wanted -= CONTACT[1] * terms.velocity[i]
-            weight = CONTACT[0]
+            wanted -= STANCE_FOOT[1] * terms.velocity[i]
+            weight = STANCE_FOOT[0]
         elif i < 3:
             error = plan.position[k, i] - measured.foot[k, i]
             rate = plan.velocity[k, i] - terms.velocity[i]
-            wanted += plan.acceleration[k, i] + SWING[2] * error + kd * rate
-            weight = SWING[0]
+            wanted += plan.acceleration[k, i] + SWING_FOOT[2] * error + kd * rate
+            weight = SWING_FOOT[0]
         else:
-            wanted += SWING[2] * turn[i - 3] - kd * terms.velocity[i]
-            weight = SWING[1]
+            wanted += SWING_FOOT[2] * turn[i - 3] - kd * terms.velocity[i]
+            weight = SWING_FOOT[1]
         _add_row(body, row + i, terms.J[i], wanted, weight)
     return row + count
 
@@ -168,7 +169,9 @@ def _yield(body: WholeBodyDynamics, least: float) -> float:
     """
     if body.site.shape[0] == 2 and body.gait.state[0].mode == _STEP:
         return 1.0
-    inside = (body.plan.margin[0] - EDGE[0]) / (EDGE[1] - EDGE[0])
+    inside = (body.plan.margin[0] - SUPPORT_MARGINS[0]) / (
+        SUPPORT_MARGINS[1] - SUPPORT_MARGINS[0]
+    )
     return min(max(inside, least), 1.0)
 
 
@@ -185,7 +188,8 @@ def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
     com, root = terms.com, physics.qpos[state.root_qpos :]
     R = rotation(physics.xmat, state.body)
     x, y, z = com[0] - root[0], com[1] - root[1], com[2] - root[2]
-    weight, turning = np.full(3, COM_WEIGHT), SPIN[0] * _yield(body, YIELDING)
+    weight, share = np.full(3, COM_WEIGHT), _yield(body, YIELDING_ATTITUDE)
+    turning = ANGULAR_MOMENTUM[0] * share
     weight[2] *= _yield(body, YIELDING_HEIGHT)
     if state.tracks == 1:
         weight[:], turning = state.com_weight, 0.0
@@ -204,7 +208,8 @@ def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
             plan.com_acceleration[i] - physics.gravity[i] - terms.held[i] / state.mass
         )
         qp.e[row + i] = weight[i] * wanted
-        qp.e[row + 3 + i] = -turning * (SPIN[1] * terms.spin[i] + terms.held[3 + i])
+        decay = ANGULAR_MOMENTUM[1] * terms.spin[i]
+        qp.e[row + 3 + i] = -turning * (decay + terms.held[3 + i])
     return row + 6
 
 
@@ -230,12 +235,12 @@ def _add_upright(physics: Physics, body: WholeBodyDynamics, k: int, row: int) ->
     _write_heading(gait.yaw, heading)
     matrix_product(heading, body.upright_pose[k].reshape((3, 3)), R_goal)
     matrix_product(R_goal, rotation(physics.xmat, link).T, R_error)
-    turn, share = np.empty(3), _yield(body, YIELDING)
+    turn, share = np.empty(3), _yield(body, YIELDING_ATTITUDE)
     log3(R_error, turn)
     for i in range(3):
         rate = gait.velocity[2] if i == 2 and gait.mode == 1 else 0.0
-        wanted = UPRIGHT[0] * turn[i] + UPRIGHT[1] * (rate - terms.velocity[3 + i])
-        wanted -= terms.drift[3 + i]
+        damping = UPRIGHT_GAINS[1] * (rate - terms.velocity[3 + i])
+        wanted = UPRIGHT_GAINS[0] * turn[i] + damping - terms.drift[3 + i]
         weight = body.upright_weight[k] * (1.0 if i == 2 else share)
         _add_row(body, row + i, terms.J[3 + i], wanted, weight)
     return row + 3
@@ -263,8 +268,9 @@ def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
         heading, own = np.zeros((3, 3)), R_goal.copy()
         _write_heading(gait.yaw, heading)
         matrix_product(heading, own, R_goal)
-        p_goal[:] = rotated(heading, p_goal)
-        twist[:3], twist[3:] = rotated(heading, twist[:3]), rotated(heading, twist[3:])
+        p_goal = rotated(heading, p_goal)
+        copy_vector(rotated(heading, twist), twist)
+        copy_vector(rotated(heading, twist[3:]), twist[3:])
         for i in range(2):
             p_goal[i] += terms.com[i]
             lead[i] = body.measured.com_velocity[i]
@@ -279,15 +285,15 @@ def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
     for i in range(3):
         error[i] = p_goal[i] - p[i]
     for i in range(2):
-        part, far = error[3 * i : 3 * i + 3], FARTHEST[i]
+        part, far = error[3 * i : 3 * i + 3], HAND_ERROR_MAX[i]
         length = np.sqrt(part[0] ** 2 + part[1] ** 2 + part[2] ** 2)
         saturate(part, far)
         for j in range(3):  # a hand that is held back is not led either
             lead[3 * i + j] += twist[3 * i + j] * min(
-                1.0, HELD_BACK[i] / max(length, 1e-9)
+                1.0, HAND_LEAD_MAX[i] / max(length, 1e-9)
             )
     kd = 2.0 * np.sqrt(HAND_KP)
-    share = RECOVERING if gait.time < gait.until else 1.0
+    share = RECOVERING_HANDS if gait.time < gait.until else 1.0
     share = min(share, _yield(body, YIELDING_HANDS))
     for i in range(6):
         wanted = HAND_KP * error[i] + kd * (lead[i] - terms.velocity[i])

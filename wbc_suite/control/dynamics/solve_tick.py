@@ -3,8 +3,8 @@
 import numpy as np
 
 from wbc_suite.compiling import compiled, inner
-from wbc_suite.control.dynamics.arrays import Stage, WholeBodyDynamics
-from wbc_suite.control.dynamics.qp_rows import state_qp
+from wbc_suite.control.dynamics.arrays import QpStage, WholeBodyDynamics
+from wbc_suite.control.dynamics.qp_rows import write_qp
 from wbc_suite.control.dynamics.terms import (
     measure,
     write_frame_terms,
@@ -18,38 +18,38 @@ from wbc_suite.locomotion.gait import GRAVITY
 from wbc_suite.qp.active_set import solve_warm
 from wbc_suite.typing import Vector
 
-_STATED, _SOLVED = int(Stage.STATED), int(Stage.SOLVED)
-_UNSOLVED = int(Stage.UNSOLVED)
+_WRITTEN, _SOLVED = int(QpStage.WRITTEN), int(QpStage.SOLVED)
+_UNSOLVED = int(QpStage.UNSOLVED)
 
-OBSERVER = 6.0
+LOAD_BANDWIDTH = 6.0
 """1/s; bandwidth of the observed loads on hands."""
 
-FORGETTING = 0.05
+LOAD_DECAY = 0.05
 """1/s; rate at which a load is forgotten."""
 
-STRONGEST_CHANGE = 200.0
+LOAD_CHANGE_MAX = 200.0
 """N or N m; greatest change of a load that one step shows."""
 
-HEAVIEST, HEAVIEST_MOMENT = 120.0, 8.0
+LOAD_FORCE_MAX, LOAD_MOMENT_MAX = 120.0, 8.0
 """N and N m; greatest load."""
 
-AT_STOP, STOP_HORIZON = 0.01, 0.1
+STOP_DISTANCE, STOP_HORIZON = 0.01, 0.1
 """rad or m, and s; where a joint is so near to its limit now or after this time, its
 stop may act, and estimated loads fade: they would push it on."""
 
-FADING = 8.0
-"""Rate of fading over `OBSERVER`."""
+LOAD_FADING = 8.0
+"""Rate of fading over `LOAD_BANDWIDTH`."""
 
-DAMPING = 1e-3
+WRENCH_DAMPING = 1e-3
 """m^2; damps the wrench in directions that the arm does not feel."""
 
-TILTED = 0.6
+FALL_TILT_COSINE = 0.6
 """Cosine of the tilt from which a robot has fallen: 53 degrees."""
 
-FALLEN = (100.0, 40.0)
+FALLEN_GAINS = (100.0, 40.0)
 """kp, 1/s^2, and kd, 1/s, that hold the joints of a robot that fell."""
 
-DROPPED = 0.15
+FALL_DROP = 0.15
 """m; a robot whose trunk is so much lower than commanded has fallen."""
 
 
@@ -76,7 +76,7 @@ def solve_whole_body(physics: Physics, body: WholeBodyDynamics) -> bool:
         body.planner(body.gait, body.measured, body.command, state.dt, body.plan)
     if state.is_free == 1 and state.tracks == 0:
         _watch_fall(physics, body)
-    state_qp(physics, body)
+    write_qp(physics, body)
     state.ticks += 1
     if solve_warm(body.qp):
         state.stage = _SOLVED
@@ -94,7 +94,7 @@ def _hold_joints(physics: Physics, body: WholeBodyDynamics) -> None:
     body.load[:], qp.x[:edges] = 0.0, 0.0
     for j in range(body.qpos.shape[0]):
         error = body.posture[j] - physics.qpos[body.qpos[j]]
-        qp.x[edges + j] = FALLEN[0] * error - FALLEN[1] * terms.v[6 + j]
+        qp.x[edges + j] = FALLEN_GAINS[0] * error - FALLEN_GAINS[1] * terms.v[6 + j]
     body.state[0].ticks += 1
     body.state[0].stage = _SOLVED
 
@@ -103,7 +103,7 @@ def _hold_joints(physics: Physics, body: WholeBodyDynamics) -> None:
 def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write accelerations of root and joints, and torques of contacts and loads."""
     qp, terms = body.qp, body.terms
-    body.state[0].stage = _STATED
+    body.state[0].stage = _WRITTEN
     edges, size = terms.B.shape[0], qp.x.shape[0]
     for i in range(6):
         terms.a[i] = dot(terms.root[i], qp.x, size) + terms.root[i, size]
@@ -147,13 +147,15 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
     for k in range(body.hand.shape[0]):
         p, load = physics.site_xpos[body.hand[k]], body.load[k]
         write_frame_terms(physics, body, int(physics.site_bodyid[body.hand[k]]), p)
-        change = _missing_wrench(body, k, residual)
-        if _is_at_stop(physics, body, k):
-            change[:] = -FADING * load
+        change, stopped = (
+            _missing_wrench(body, k, residual),
+            _is_at_stop(physics, body, k),
+        )
         for r in range(6):
-            part = min(max(change[r], -STRONGEST_CHANGE), STRONGEST_CHANGE)
-            most = HEAVIEST if r < 3 else HEAVIEST_MOMENT
-            load[r] += state.dt * (OBSERVER * part - FORGETTING * load[r])
+            part = -LOAD_FADING * load[r] if stopped else change[r]
+            part = min(max(part, -LOAD_CHANGE_MAX), LOAD_CHANGE_MAX)
+            most = LOAD_FORCE_MAX if r < 3 else LOAD_MOMENT_MAX
+            load[r] += state.dt * (LOAD_BANDWIDTH * part - LOAD_DECAY * load[r])
             load[r] = min(max(load[r], -most), most)
             terms.held[r] += load[r]
             for j in range(size):
@@ -179,7 +181,10 @@ def _is_at_stop(physics: Physics, body: WholeBodyDynamics, k: int) -> bool:
     for j in range(body.qpos.shape[0]):
         q = physics.qpos[body.qpos[j]]
         ahead = q + STOP_HORIZON * physics.qvel[body.dofs[6 + j]]
-        outside = min(q, ahead) < low[j] + AT_STOP or max(q, ahead) > high[j] - AT_STOP
+        outside = (
+            min(q, ahead) < low[j] + STOP_DISTANCE
+            or max(q, ahead) > high[j] - STOP_DISTANCE
+        )
         at_stop = at_stop or (outside and body.is_arm[k, j] == 1)
     return at_stop
 
@@ -195,7 +200,7 @@ def _missing_wrench(body: WholeBodyDynamics, k: int, residual: Vector) -> Vector
     """
     J, A, x = body.terms.J, np.zeros((6, 6)), np.zeros(6)
     for r in range(6):
-        A[r, r] = DAMPING
+        A[r, r] = WRENCH_DAMPING
         for j in range(6, J.shape[1]):
             if body.is_arm[k, j - 6] == 1:
                 x[r] += J[r, j] * residual[j]
@@ -215,9 +220,9 @@ def _watch_fall(physics: Physics, body: WholeBodyDynamics) -> None:
     lower = gait.nominal_height - gait.height
     height = physics.xpos[state.body, 2] - gait.ground
     drop = state.trunk_height - lower - height
-    if state.fell < 0.0 and (upright < TILTED or drop > DROPPED):
+    if state.fell < 0.0 and (upright < FALL_TILT_COSINE or drop > FALL_DROP):
         state.fell, state.drop = gait.time, drop
         state.tilt = np.arccos(min(max(upright, -1.0), 1.0))
-        state.fell_by_tilt = 1 if upright < TILTED else 0
+        state.fell_by_tilt = 1 if upright < FALL_TILT_COSINE else 0
         for j in range(body.qpos.shape[0]):
             body.posture[j] = physics.qpos[body.qpos[j]]

@@ -8,7 +8,7 @@ import numpy as np
 from wbc_suite.control.dynamics.arrays import (
     Foot,
     Limits,
-    Stage,
+    QpStage,
     Tracked,
     WholeBodyDynamics,
     make_dynamics,
@@ -103,9 +103,9 @@ class Standing:
     def finish_tick(self) -> None:
         """Solve the QP if the loop has stated it and not found its active set."""
         record = self.dynamics.state[0]
-        if record["stage"] == Stage.UNSOLVED:
+        if record["stage"] == QpStage.UNSOLVED:
             self.fallback = self._qp.solve(self.dynamics.qp)
-            record["stage"] = Stage.SOLVED
+            record["stage"] = QpStage.SOLVED
 
 
 def _make_dynamics(

@@ -12,7 +12,7 @@ from pydantic import NonNegativeFloat
 
 from wbc_suite.compiling import compiled, inner, readable, struct
 from wbc_suite.control.dynamics.arrays import (
-    Stage,
+    QpStage,
     WholeBodyDynamics,
     for_plain_python,
 )
@@ -34,7 +34,7 @@ from wbc_suite.typing import Indices, Matrix, Records, Vector
 ROWS = 4096
 """Readings after which the noise repeats."""
 
-_SOLVED = int(Stage.SOLVED)
+_SOLVED = int(QpStage.SOLVED)
 
 
 class StateSourceConfig(FrozenModel):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wbc_suite.compiling import compiled, inner
-from wbc_suite.control.dynamics.arrays import EDGES, WholeBodyDynamics
+from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import (
     point_jacobian_column,
@@ -12,7 +12,7 @@ from wbc_suite.control.loop.rigid_body import (
     rotation,
     write_inertia,
 )
-from wbc_suite.linear_algebra import dot, solve
+from wbc_suite.linear_algebra import copy_vector, dot, solve
 from wbc_suite.typing import Vector
 
 
@@ -67,7 +67,7 @@ def measure(physics: Physics, body: WholeBodyDynamics) -> None:
     for k in range(body.site.shape[0]):
         R = rotation(physics.site_xmat, body.site[k])
         measured.foot_yaw[k] = np.arctan2(R[1, 0], R[0, 0])
-        measured.foot[k] = foot_middle(physics, body, k)
+        copy_vector(foot_middle(physics, body, k), measured.foot[k])
         link = int(physics.site_bodyid[body.site[k]])
         point_velocity_and_drift(
             physics, link, measured.foot[k], terms.velocity, terms.drift
@@ -85,18 +85,20 @@ def _measure_base(physics: Physics, body: WholeBodyDynamics) -> None:
     point_velocity_and_drift(physics, link, p, terms.velocity, terms.drift)
     gait.yaw, gait.ground = np.arctan2(R[1, 0], R[0, 0]), p[2]
     gait.velocity[2] = terms.velocity[5]
-    terms.com[:], measured.com_velocity[:] = p, terms.velocity[:3]
+    copy_vector(p, terms.com)
+    copy_vector(terms.velocity[:3], measured.com_velocity)
 
 
 @inner
 def foot_middle(physics: Physics, body: WholeBodyDynamics, k: int) -> Vector:
     """Return the middle of a foot's contact, world axes, m, shape (3,)."""
-    site = body.site[k]
+    site, middle = body.site[k], body.middle[k]
     if body.is_sole[k] == 1:
-        middle = rotated(rotation(physics.site_xmat, site), body.middle[k])
-    else:
-        middle = body.middle[k]
-    return physics.site_xpos[site] + middle
+        middle = rotated(rotation(physics.site_xmat, site), middle)
+    found = np.empty(3)
+    for i in range(3):
+        found[i] = physics.site_xpos[site, i] + middle[i]
+    return found
 
 
 @compiled
@@ -117,43 +119,6 @@ def write_frame_terms(
         dof = int(physics.dof_parentid[dof])
     for i in range(6):
         terms.velocity[i] = dot(terms.J[i], terms.v, terms.v.shape[0])
-
-
-@inner
-def write_edges(physics: Physics, body: WholeBodyDynamics, k: int) -> None:
-    """Write the generalised forces of a foot's friction pyramids.
-
-    `terms.J` is the Jacobian of the foot's middle. An edge is a force of which 1 N is
-    normal to the ground; on a sole the normal is the sole's.
-    """
-    terms, state = body.terms, body.state[0]
-    size = body.dofs.shape[0]
-    mu = state.friction / np.sqrt(2.0)
-    R = rotation(physics.site_xmat, body.site[k])
-    d, local, wrench = np.empty(3), np.empty(3), np.empty(6)
-    for edge in range(body.first_edge[k], body.first_edge[k + 1]):
-        point, side = edge // EDGES, edge % EDGES
-        local[0] = mu if side < 2 else -mu
-        local[1] = mu if side % 2 == 0 else -mu
-        local[2] = 1.0
-        r = np.zeros(3)
-        if body.is_sole[k] == 1:
-            d[:] = rotated(R, local)
-            for i in range(3):
-                for j in range(2):
-                    r[i] += R[i, j] * body.corner[point, j]
-        else:
-            d[:] = local
-        wrench[:3] = d
-        wrench[3] = r[1] * d[2] - r[2] * d[1]
-        wrench[4] = r[2] * d[0] - r[0] * d[2]
-        wrench[5] = r[0] * d[1] - r[1] * d[0]
-        row = terms.B[edge]
-        for j in range(size):
-            total = 0.0
-            for i in range(6):
-                total += wrench[i] * terms.J[i, j]
-            row[j] = total
 
 
 @inner

@@ -10,7 +10,7 @@ from wbc_suite.compiling import inner
 from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import matrix_product, rotated, rotation
-from wbc_suite.linear_algebra import cross
+from wbc_suite.linear_algebra import cross, dot
 from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.typing import Matrix, Vector
 
@@ -37,7 +37,7 @@ def track_motion(physics: Physics, body: WholeBodyDynamics) -> None:
     for i in range(size):
         wanted[i] += kp * error[i] + 2.0 * np.sqrt(kp) * rate[i]
     for i in range(3):  # the root's linear rows of M are m J of the centre of mass
-        force = np.sum(terms.M[i] * wanted) + terms.h[i]
+        force = dot(terms.M[i], wanted, size) + terms.h[i]
         plan.com_acceleration[i] = force / state.mass + physics.gravity[i]
     plan.margin[0] = 1.0
 
@@ -54,24 +54,32 @@ def _write_root_errors(
 
     In MuJoCo's axes: linear in the world's, angular in its own.
     """
+    # In loops: numba compiles an expression of vectors for 0.1 s.
     state, root, s = body.state[0], body.tracked.root, body.tracked.since[0]
-    offset = root[0] + s * (root[1] + s * (0.5 * root[2] + s / 6.0 * root[3]))
-    twist = root[1] + s * (root[2] + 0.5 * s * root[3])
-    change = root[2] + s * root[3]
+    offset, twist, change = np.empty(6), np.empty(6), np.empty(6)
+    for i in range(6):
+        v, a, jerk = root[1, i], root[2, i], root[3, i]
+        offset[i] = root[0, i] + s * (v + s * (0.5 * a + s / 6.0 * jerk))
+        twist[i] = v + s * (a + 0.5 * s * jerk)
+        change[i] = a + s * jerk
     R_start, R_turned = np.empty((3, 3)), np.empty((3, 3))
     R_goal, R_error = np.empty((3, 3)), np.empty((3, 3))
-    _write_rotation(body.tracked.start[3:], R_start)
+    start, measured = body.tracked.start, physics.qpos[state.root_qpos :]
+    _write_rotation(start[3:], R_start)
     exp3(offset[3], offset[4], offset[5], R_turned)
     matrix_product(R_start, R_turned, R_goal)
     matrix_product(rotation(physics.xmat, state.body).T, R_goal, R_error)
     log3(R_error, error[3:6])
-    error[:3] = body.tracked.start[:3] + rotated(R_start, offset[:3])
-    error[:3] -= physics.qpos[state.root_qpos : state.root_qpos + 3]
-    rate[:3], rate[3:6] = rotated(R_goal, twist[:3]), twist[3:]
-    rate[:6] -= body.terms.v[:6]
-    turning = cross(twist[3:], twist[:3])
-    acceleration[:3] = rotated(R_goal, change[:3] + turning)
-    acceleration[3:6] = change[3:]
+    way, speed = rotated(R_start, offset), rotated(R_goal, twist)
+    turning = cross(twist[3:], twist)
+    for i in range(3):
+        change[i] += turning[i]
+        error[i] = start[i] + way[i] - measured[i]
+        rate[i], rate[3 + i] = speed[i], twist[3 + i]
+    gained = rotated(R_goal, change)
+    for i in range(6):
+        rate[i] -= body.terms.v[i]
+        acceleration[i] = gained[i] if i < 3 else change[i]
 
 
 @inner

@@ -10,7 +10,7 @@ forces of robots on their feet.
 from typing import Any, TypeAlias
 
 from wbc_suite.compiling import compiled, inner
-from wbc_suite.control.dynamics.arrays import Stage
+from wbc_suite.control.dynamics.arrays import QpStage
 from wbc_suite.control.law.osc_saturation import is_saturated
 from wbc_suite.control.law.reference import reference_at
 from wbc_suite.control.loop.acceleration_limits import limit_accelerations
@@ -20,7 +20,7 @@ from wbc_suite.control.loop.records import CompiledRecords, LawKind
 from wbc_suite.control.loop.rigid_body import multiply_inertia
 
 _OSC, _TORQUE, _SERVO = int(LawKind.OSC), int(LawKind.TORQUE), int(LawKind.SERVO)
-_STATED = int(Stage.STATED)
+_WRITTEN = int(QpStage.WRITTEN)
 
 WholeBodies: TypeAlias = Any
 """A tuple of `WholeBodyDynamics`, one for each robot on its feet; None without any."""
@@ -43,7 +43,7 @@ def write_commands(
     if bodies is None:
         ask_accelerations(physics, laws, drives, kernels, bodies)
     else:
-        if bodies[0].state[0].stage == _STATED:  # else it goes on after Python
+        if bodies[0].state[0].stage == _WRITTEN:  # else it goes on after Python
             ask_accelerations(physics, laws, drives, kernels, bodies)
         done = True
         for body in bodies:
