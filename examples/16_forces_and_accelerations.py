@@ -14,8 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp import ComTask, Problem
-from wbc_suite.qp.solver import make_solver
+from wbc_suite.qp import ComTask, Problem, make_solver
 
 KP, KD = 60.0, 16.0  # 1/s^2 and 1/s
 DT = 0.005  # s

@@ -31,6 +31,7 @@ from wbc_suite.qp.report import (
 )
 from wbc_suite.qp.self_collision_limit import LinkPair, SelfCollisionLimit
 from wbc_suite.qp.solution import Fallback, Solution
+from wbc_suite.qp.solver import make_solver
 from wbc_suite.qp.stack import TaskStack
 from wbc_suite.qp.standing_limits import Sole, SupportLimit, WeightLimit
 from wbc_suite.qp.task import JointTask, RowTask, Task
@@ -83,6 +84,7 @@ __all__ = [
     "TickRecord",
     "VelocityLimit",
     "WeightLimit",
+    "make_solver",
     "record_type",
     "register_limit",
     "register_task",

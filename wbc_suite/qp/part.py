@@ -209,12 +209,12 @@ def kernel_of(part: object) -> Any:
     `evaluate` of tasks and `rows` of limits and equalities. One that overrides it by
     an equal one declares `kernel` in its own body.
     """
-    kind = type(part)
-    owner = next((c for c in kind.__mro__ if "kernel" in vars(c)), kind)
-    for method in ("evaluate", "rows"):
-        if getattr(kind, method, None) is not getattr(owner, method, None):
+    for kind in type(part).__mro__:
+        if "kernel" in vars(kind):
+            return getattr(kind, "kernel", None)
+        if "evaluate" in vars(kind) or "rows" in vars(kind):
             return None
-    return getattr(kind, "kernel", None)
+    return None
 
 
 def log_python_parts(parts: Iterable[object]) -> None:
