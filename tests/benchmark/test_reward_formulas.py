@@ -34,7 +34,7 @@ def near(scale, distance):
 
 @pytest.mark.parametrize("known", [None, True, False])
 def test_a_success_that_is_known_is_not_asked_for_again(known):
-    task = stub(success=lambda: True, progress=lambda: 0.25)
+    task = stub(success=lambda: True, progress=lambda: 0.25, terms=())
     reward = ObjectBenchmark.reward(task, shaped=True, success=known)
     assert reward == (0.25 if known is False else 1.0)
 

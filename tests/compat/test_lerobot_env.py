@@ -12,11 +12,8 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from wbc_suite.compat.lerobot import LeRobotEnv, eval_info, make_env
+from wbc_suite.compat.lerobot import LeRobotEnv, make_env
 from wbc_suite.errors import UnknownNameError
-from wbc_suite.evaluation import Case
-from wbc_suite.evaluation.results import collect
-from wbc_suite.executors import Outcome, WorkItem
 from wbc_suite.registration import WITH_ID
 
 ROOT = Path(__file__).parents[2]
@@ -123,32 +120,3 @@ def test_cameras_are_pixels_with_channels_last():
 def test_an_unknown_benchmark_is_named():
     with pytest.raises(UnknownNameError, match="Did you mean 'Lift'"):
         make_env(cfg=SimpleNamespace(task="Lifft"))
-
-
-def test_eval_info_has_the_fields_of_lerobot():
-    case = Case(benchmark="Lift", robots=("Panda",), policy="hold")
-    lines = [
-        {"seed": k, "success": k > 0, "succeeded": k > 0, "return": 2.0 * k}
-        | {"max_reward": 1.0, "steps": 5, "seconds": 0.1, "physics_error": None}
-        for k in range(4)
-    ]
-    items = {case: [WorkItem(name="a", payload={})]}
-    outcomes = [Outcome(name="a", result={"episodes": lines})]
-    info = eval_info(collect(items, outcomes, seconds=8.0))
-    assert info["per_task"] == [
-        {
-            "task_group": "Lift Panda hold",
-            "task_id": 0,
-            "metrics": {
-                "sum_rewards": [0.0, 2.0, 4.0, 6.0],
-                "max_rewards": [1.0] * 4,
-                "successes": [False, True, True, True],
-                "video_paths": [],
-                "predicted_video_paths": [],
-            },
-        }
-    ]
-    group = {"avg_sum_reward": 3.0, "avg_max_reward": 1.0, "pc_success": 75.0}
-    group |= {"n_episodes": 4, "video_paths": [], "predicted_video_paths": []}
-    assert info["per_group"] == {"Lift Panda hold": group}
-    assert info["overall"] == group | {"eval_s": 8.0, "eval_ep_s": 2.0}

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import DescriptionError, WbcError
 from wbc_suite.robot.assembly import describe_component
-from wbc_suite.robot.mirror import reflect_component
-from wbc_suite.robot.robot_file import Component
+from wbc_suite.robot.robot_file import Component, reflect_component
 from wbc_suite.tomlfile import parse_model, read_toml
 
 FILES = [

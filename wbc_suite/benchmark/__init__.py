@@ -14,6 +14,7 @@ from wbc_suite.benchmark.nut_assembly import NutAssembly
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.pick_place import PickPlace
 from wbc_suite.benchmark.reach import Reach
+from wbc_suite.benchmark.reward_terms import REWARD_TERMS, register_reward_term
 from wbc_suite.benchmark.stack import Stack
 from wbc_suite.benchmark.stand import Stand
 from wbc_suite.benchmark.tool_hang import ToolHang
@@ -26,6 +27,7 @@ from wbc_suite.benchmark.wipe import Wipe
 
 __all__ = [
     "BENCHMARKS",
+    "REWARD_TERMS",
     "Benchmark",
     "Carry",
     "Door",
@@ -47,6 +49,7 @@ __all__ = [
     "Wipe",
     "load_benchmark",
     "register_benchmark",
+    "register_reward_term",
 ]
 
 _VARIANTS = {

@@ -6,10 +6,11 @@ from typing import ClassVar
 
 import mujoco
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.reward_terms import SharesOfOne
 from wbc_suite.benchmark.standing import (
     ROUNDING,
     Standing,
@@ -54,20 +55,16 @@ class CarryingConfig(FrozenModel):
     margin: PositiveFloat
 
 
-class RewardConfig(FrozenModel):
+class RewardConfig(SharesOfOne):
     """Numbers of the reward; see `Carry.progress`."""
+
+    shares = ("reach", "hold", "carry", "place")
 
     reach: NonNegativeFloat
     hold: NonNegativeFloat
     carry: NonNegativeFloat
     place: NonNegativeFloat
     reach_scale: PositiveFloat
-
-    @model_validator(mode="after")
-    def _stays_below_one(self) -> "RewardConfig":
-        if self.reach + self.hold + self.carry + self.place >= 1.0:
-            raise ValueError("reach + hold + carry + place must be below 1")
-        return self
 
 
 class CarryConfig(ObjectBenchmarkConfig):

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.lift import CUBE, CubeConfig
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.reward_terms import SharesOfOne
 from wbc_suite.benchmark.standing import (
     Standing,
     StandingConfig,
@@ -23,11 +24,12 @@ from wbc_suite.scene.materials import MATERIALS
 from wbc_suite.scene.objects import SceneObject, box
 from wbc_suite.scene.placement import UniformSampler
 from wbc_suite.sensing.reading import Reading, computed
-from wbc_suite.tomlfile import FrozenModel
 
 
-class RewardConfig(FrozenModel):
+class RewardConfig(SharesOfOne):
     """Numbers of the reward; see `LocoLift.progress`."""
+
+    shares = ("approach", "reach", "grasp", "lift")
 
     approach: NonNegativeFloat
     reach: NonNegativeFloat
@@ -37,12 +39,6 @@ class RewardConfig(FrozenModel):
     reach_scale: PositiveFloat
     lift_height: PositiveFloat
     speed: PositiveFloat
-
-    @model_validator(mode="after")
-    def _stays_below_one(self) -> "RewardConfig":
-        if self.approach + self.reach + self.grasp + self.lift >= 1.0:
-            raise ValueError("approach + reach + grasp + lift must be below 1")
-        return self
 
 
 class LocoLiftConfig(ObjectBenchmarkConfig):

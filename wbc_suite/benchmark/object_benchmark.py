@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 
 import mujoco
 import numpy as np
-from pydantic import PositiveInt, field_validator
+from pydantic import Field, PositiveInt, field_validator
 
 from wbc_suite import logs
 from wbc_suite.benchmark.arrangement import (
@@ -19,6 +19,7 @@ from wbc_suite.benchmark.arrangement import (
 )
 from wbc_suite.benchmark.falls import fall_of
 from wbc_suite.benchmark.predicates import GRIP_ANGLE, Predicates
+from wbc_suite.benchmark.reward_terms import TermConfig
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, PlacementError
 from wbc_suite.robot import RobotDescription
@@ -64,6 +65,7 @@ class ObjectBenchmarkConfig(FrozenModel):
         arena: The scene around it; None for an empty floor.
         placement: A sampler of start poses in place of the benchmark's own, a table of
             `make_sampler`.
+        terms: What the shaped reward adds to the benchmark's own, see `reward_terms`.
     """
 
     one_table: ClassVar[bool] = True
@@ -77,6 +79,7 @@ class ObjectBenchmarkConfig(FrozenModel):
     places: Places
     arena: ArenaConfig | None = None
     placement: dict[str, Any] | None = None
+    terms: tuple[TermConfig, ...] = Field(default=(), alias="term")
 
     @field_validator("instructions", "paraphrases")
     @classmethod
@@ -100,6 +103,7 @@ class ObjectBenchmark(ABC):
     Attributes:
         sampler: Draws the start poses; may be replaced by a sampler of your own.
         placement: The table of a sampler that an environment puts in its place.
+        terms: What the shaped reward adds to `progress`.
         arena: The scene around it; None for an empty floor.
         states: The objects and the arena's things in the simulation, by name, after
             `bind`.
@@ -121,6 +125,7 @@ class ObjectBenchmark(ABC):
         self.name, self.title, self.horizon = config.name, config.title, config.horizon
         self._placement, self.arena = config, config.arena
         self.placement, self.sampler = config.placement, None
+        self.terms = config.terms
 
     @property
     def things(self) -> Sequence[str]:
@@ -324,10 +329,16 @@ class ObjectBenchmark(ABC):
         return [(f"{h.name}_" if several else "", h) for h in self.hands]
 
     def reward(self, *, shaped: bool, success: bool | None = None) -> float:
-        """Return 1 on success; otherwise 0, or `progress` in [0, 1) if shaped."""
+        """Return 1 on success; otherwise 0, or if shaped a value in [0, 1).
+
+        That is `progress`, and what the `terms` of the file add.
+        """
         if self.success() if success is None else success:
             return 1.0
-        return min(max(self.progress(), 0.0), BELOW_ONE) if shaped else 0.0
+        if not shaped:
+            return 0.0
+        value = self.progress() + sum(term.value(self) for term in self.terms)
+        return min(max(value, 0.0), BELOW_ONE)
 
     def offset_from_hand(self, index: int, point: Reading) -> Reading:
         """Read the offset from a hand to a point in world axes, m."""

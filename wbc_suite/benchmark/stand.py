@@ -5,10 +5,11 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.reward_terms import SharesOfOne
 from wbc_suite.benchmark.standing import (
     ROUNDING,
     Standing,
@@ -22,27 +23,22 @@ from wbc_suite.robot import RobotDescription
 from wbc_suite.scene import Push, PushConfig, draw_pushes
 from wbc_suite.scene.objects import SceneObject
 from wbc_suite.sensing.reading import Reading, computed
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 PLACE = 3
 """Entries of user data: x and y of the start, m, and the heading there, rad."""
 
 
-class RewardConfig(FrozenModel):
+class RewardConfig(SharesOfOne):
     """Numbers of the reward; see `Stand.progress`."""
+
+    shares = ("upright", "rest", "back")
 
     upright: NonNegativeFloat
     rest: NonNegativeFloat
     back: NonNegativeFloat
     speed_scale: PositiveFloat
     back_scale: PositiveFloat
-
-    @model_validator(mode="after")
-    def _stays_below_one(self) -> "RewardConfig":
-        if self.upright + self.rest + self.back >= 1.0:
-            raise ValueError("upright + rest + back must be below 1")
-        return self
 
 
 class StandConfig(ObjectBenchmarkConfig):

@@ -5,10 +5,11 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.reward_terms import SharesOfOne
 from wbc_suite.benchmark.standing import (
     Standing,
     StandingConfig,
@@ -51,20 +52,16 @@ class GoalConfig(FrozenModel):
     color: tuple[Channel, Channel, Channel, Channel]
 
 
-class RewardConfig(FrozenModel):
+class RewardConfig(SharesOfOne):
     """Numbers of the reward; see `WalkTo.progress`."""
+
+    shares = ("place", "heading", "rest")
 
     place: NonNegativeFloat
     heading: NonNegativeFloat
     rest: NonNegativeFloat
     place_scale: PositiveFloat
     speed_scale: PositiveFloat
-
-    @model_validator(mode="after")
-    def _stays_below_one(self) -> "RewardConfig":
-        if self.place + self.heading + self.rest >= 1.0:
-            raise ValueError("place + heading + rest must be below 1")
-        return self
 
 
 class WalkToConfig(ObjectBenchmarkConfig):

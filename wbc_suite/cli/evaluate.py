@@ -263,13 +263,12 @@ def _cases(
 
 def _report(results: "Results", output: Path, *, as_json: bool) -> None:
     """Print figures and write the files; fail when an item failed."""
-    from wbc_suite.compat.lerobot import eval_info
     from wbc_suite.evaluation.report import report_page
 
     figures = results.figures()
     files = {
         "summary.json": json.dumps(figures, indent=1) + "\n",
-        "eval_info.json": json.dumps(eval_info(results), indent=2) + "\n",
+        "eval_info.json": json.dumps(results.as_lerobot(), indent=2) + "\n",
         "report.html": report_page(results, " ".join(["wbc-suite", *sys.argv[1:]])),
     }
     for name, text in files.items():

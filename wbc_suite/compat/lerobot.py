@@ -1,11 +1,11 @@
-"""LeRobot: our benchmarks as its environments, and its file of evaluation results.
+"""LeRobot: our benchmarks as its environments.
 
 `make_env` has the signature that LeRobot asks of an `env.py`. Environments observe
 `agent_pos` (robots), `environment_state` (objects) and, with cameras, `pixels`: the
 names that LeRobot maps to those of `wbc-suite convert --to lerobot`.
 
-Sources: LeRobot 0.6.1, `lerobot.envs.factory`, `lerobot.scripts.lerobot_eval`; its
-documentation of environments from the Hub.
+Sources: LeRobot 0.6.1, `lerobot.envs.factory`; its documentation of environments from
+the Hub.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,7 +23,6 @@ from gymnasium.vector import (
 
 from wbc_suite.envs import RobotEnv, make
 from wbc_suite.errors import UnknownNameError
-from wbc_suite.evaluation.results import Results
 from wbc_suite.registration import WITH_ID
 
 SUITE = "wbc_suite"
@@ -181,52 +180,6 @@ def make_env(
         for name in names
     }
     return {SUITE: made}
-
-
-def eval_info(results: Results) -> dict[str, Any]:
-    """Return the content of LeRobot's `eval_info.json`.
-
-    A task group is a benchmark with its robots, controller and policy; the id is its
-    number among all.
-    """
-    per_task, per_group = [], {}
-    everyone: list[dict[str, Any]] = []
-    every_film: list[str] = []
-    for k, (case, episodes) in enumerate(results.episodes.items()):
-        films = [str(film.path) for film in results.films.get(case, ())]
-        metrics = {
-            "sum_rewards": [e["return"] for e in episodes],
-            "max_rewards": [e["max_reward"] for e in episodes],
-            "successes": [e["succeeded"] for e in episodes],
-            "video_paths": films,
-            "predicted_video_paths": [],
-        }
-        per_task.append({"task_group": case.title, "task_id": k, "metrics": metrics})
-        per_group[case.title] = _aggregate(episodes, films)
-        everyone += episodes
-        every_film += films
-    time = {
-        "eval_s": results.seconds,
-        "eval_ep_s": results.seconds / max(1, len(everyone)),
-    }
-    overall = _aggregate(everyone, every_film) | time
-    return {"per_task": per_task, "per_group": per_group, "overall": overall}
-
-
-def _aggregate(
-    episodes: Sequence[Mapping[str, Any]], films: Sequence[str]
-) -> dict[str, Any]:
-    def mean(key: str) -> float:
-        return float(np.mean([e[key] for e in episodes])) if episodes else float("nan")
-
-    return {
-        "avg_sum_reward": mean("return"),
-        "avg_max_reward": mean("max_reward"),
-        "pc_success": 100.0 * mean("succeeded"),
-        "n_episodes": len(episodes),
-        "video_paths": list(films),
-        "predicted_video_paths": [],
-    }
 
 
 def _space_of(seen: Any) -> gymnasium.Space[Any]:

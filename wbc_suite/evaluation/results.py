@@ -99,6 +99,41 @@ class Results:
             ],
         }
 
+    def as_lerobot(self) -> dict[str, Any]:
+        """Return the content of `eval_info.json` as LeRobot's `lerobot-eval` writes it.
+
+        A task group is a benchmark with its robots, controller and policy; the id is
+        its number among all.
+
+        Source: LeRobot 0.6.1, `lerobot.scripts.lerobot_eval`.
+        """
+        films = {c: [str(f.path) for f in self.films.get(c, ())] for c in self.episodes}
+        per_task = [
+            {
+                "task_group": case.title,
+                "task_id": k,
+                "metrics": {
+                    "sum_rewards": [e["return"] for e in episodes],
+                    "max_rewards": [e["max_reward"] for e in episodes],
+                    "successes": [e["succeeded"] for e in episodes],
+                    "video_paths": films[case],
+                    "predicted_video_paths": [],
+                },
+            }
+            for k, (case, episodes) in enumerate(self.episodes.items())
+        ]
+        groups = {
+            case.title: _lerobot_group(episodes, films[case])
+            for case, episodes in self.episodes.items()
+        }
+        everyone = [e for episodes in self.episodes.values() for e in episodes]
+        overall = _lerobot_group(
+            everyone, [path for paths in films.values() for path in paths]
+        )
+        per_episode = self.seconds / max(1, len(everyone))
+        time = {"eval_s": self.seconds, "eval_ep_s": per_episode}
+        return {"per_task": per_task, "per_group": groups, "overall": overall | time}
+
 
 def collect(
     items: Mapping[Case, Sequence[WorkItem]],
@@ -157,6 +192,22 @@ def _case(case: Case) -> dict[str, Any]:
         "controller": case.controller,
         "policy": case.policy,
         "perturb": case.perturb,
+    }
+
+
+def _lerobot_group(
+    episodes: Sequence[Mapping[str, Any]], films: list[str]
+) -> dict[str, Any]:
+    def mean(key: str) -> float:
+        return float(np.mean([e[key] for e in episodes])) if episodes else float("nan")
+
+    return {
+        "avg_sum_reward": mean("return"),
+        "avg_max_reward": mean("max_reward"),
+        "pc_success": 100.0 * mean("succeeded"),
+        "n_episodes": len(episodes),
+        "video_paths": films,
+        "predicted_video_paths": [],
     }
 
 

@@ -10,17 +10,17 @@ so that a robot whose target is out of reach stands still.
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.frame_task import FrameTask
+from wbc_suite.qp.level import Level
 from wbc_suite.qp.lie import is_usable
+from wbc_suite.qp.limit import JointBounds
+from wbc_suite.qp.solution import Solution
 from wbc_suite.typing import Indices, Vector
-
-if TYPE_CHECKING:
-    from wbc_suite.qp.stack import TaskStack
 
 _STILL = 0.02  # rad/s or m/s; a slower robot stands
 _STANDING_TIME = 0.25  # s of standing before a simulation
@@ -36,6 +36,27 @@ _DRIVE_COST = 3.0  # against the greatest cost of a watched task
 _DRIVE_SPEED = 0.5  # of the velocity limit
 
 
+class Stack(Protocol):
+    """What an escape reads of a stack of tasks, and what it simulates with a copy."""
+
+    configuration: Configuration
+    bounds: JointBounds
+    levels: list[Level]
+    v_previous: Vector
+
+    def pressed(self) -> Indices:
+        """Return the velocity indices whose bounds hold the command back."""
+        ...
+
+    def copy(self) -> "Stack":
+        """Return a stack of its own for a copy of the robot."""
+        ...
+
+    def solve(self, dt: float) -> Solution:
+        """Return the command of the next `dt` seconds."""
+        ...
+
+
 @dataclass(slots=True)
 class _Drive:
     """Joints on their way to the middle of their ranges."""
@@ -47,7 +68,7 @@ class _Drive:
 class Escape:
     """Monitors frame tasks of a stack, and drives joints with two position limits."""
 
-    def __init__(self, stack: "TaskStack", tasks: Sequence[FrameTask]) -> None:
+    def __init__(self, stack: Stack, tasks: Sequence[FrameTask]) -> None:
         self._stack, self._tasks = stack, tuple(tasks)
         self._configuration, self._bounds = stack.configuration, stack.bounds
         self._range = self._bounds.q_upper - self._bounds.q_lower
@@ -121,12 +142,12 @@ class Escape:
                 return _Drive(joints)
         return None
 
-    def _is_over(self, drive: _Drive, stack: "TaskStack") -> bool:
+    def _is_over(self, drive: _Drive, stack: Stack) -> bool:
         left = np.abs(self._to_middle(drive.joints, stack))
         arrived = bool((left < _ARRIVED * self._range[drive.joints]).all())
         return arrived or drive.time > _DRIVE_TIME
 
-    def _push(self, drive: _Drive, stack: "TaskStack", dt: float) -> None:
+    def _push(self, drive: _Drive, stack: Stack, dt: float) -> None:
         """Write the bias of a drive: squared costs and weighted steps."""
         joints, bias = drive.joints, stack.levels[0].arrays.bias
         cost = _DRIVE_COST * max(float(t.cost.max()) for t in self._tasks)
@@ -136,7 +157,7 @@ class Escape:
         bias[0, joints], bias[1, joints] = cost**2, cost**2 * step
         drive.time += dt
 
-    def _to_middle(self, joints: Indices, stack: "TaskStack") -> Vector:
+    def _to_middle(self, joints: Indices, stack: Stack) -> Vector:
         bounds, q = self._bounds, stack.configuration.q
         middle = 0.5 * (bounds.q_upper[joints] + bounds.q_lower[joints])
         return middle - q[bounds.q_index[joints]]

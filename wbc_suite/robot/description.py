@@ -41,18 +41,8 @@ class RobotDescription(Elements):
 
     @model_validator(mode="after")
     def _check(self) -> "RobotDescription":
-        check_description(self)
+        check_description(self, self.synergies)
         return self
-
-    @cached_property
-    def joints(self) -> tuple[Joint, ...]:
-        """All joints except the root's, in the order of both engines."""
-        return tuple(link.joint for link in self.links if link.joint is not None)
-
-    @cached_property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of `joints`."""
-        return tuple(joint.name for joint in self.joints)
 
     @property
     def root_joint_names(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ the format. SI units, radians, quaternions w x y z. A link's frame is at its joi
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import (
@@ -313,6 +314,16 @@ class Elements(FrozenModel):
     keyframes: dict[Name, dict[Name, float]] = Field(default={}, alias="keyframe")
     contacts: Contacts = Contacts()
     root: Root = Root()
+
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        """All joints except the root's, in the order of both engines."""
+        return tuple(link.joint for link in self.links if link.joint is not None)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of `joints`."""
+        return tuple(joint.name for joint in self.joints)
 
 
 def rigid_bodies(links: Sequence[Link]) -> dict[str, str]:

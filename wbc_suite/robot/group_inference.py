@@ -4,9 +4,9 @@ Words of names and the structure of the tree give them. Users edit the result.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
 from wbc_suite.robot.name_words import (
@@ -19,9 +19,6 @@ from wbc_suite.robot.name_words import (
     words_of,
 )
 from wbc_suite.robot.shape_geometry import farthest_point
-
-if TYPE_CHECKING:
-    from wbc_suite.robot.importing import NameTable
 
 END_OF = {
     "arm": "eef",
@@ -226,13 +223,13 @@ def infer_frames(
     links: Sequence[Link],
     limbs: Sequence[Limb],
     given: Sequence[Frame],
-    names: "NameTable",
+    take: Callable[[str, str], str],
 ) -> tuple[Frame, ...]:
     """Return the given frames, and `eef`, `foot`, `head`, `torso` at the limbs' ends.
 
     A new frame is placed at a given frame or link with a word of `END_WORDS`, or else
     at the tip, where a leg of a quadruped ends. A gripper gets a `tcp` only in the
-    first case.
+    first case. `take` returns a free name near the given one, for a kind of element.
     """
     frames = {frame.name: frame for frame in given}
     for limb in limbs:
@@ -246,7 +243,7 @@ def infer_frames(
             if any(frame.name == name for frame in given):
                 frames[name] = frames[name].model_copy(update={"role": role})
             elif placed is not None:
-                name = names.take(name, "frame")
+                name = take(name, "frame")
                 fields = {"name": name, "role": role, **placed}
                 frames[name] = Frame.model_validate(fields)
     return tuple(frames.values())

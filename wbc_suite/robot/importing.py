@@ -118,7 +118,7 @@ def describe_import(
     roles = [x | {"role": infer_role(x["name"])} for x in frames]
     given = [parse_model(Frame, x, **how) for x in roles]
     limbs = infer_limbs(checked)
-    placed = infer_frames(checked, limbs, given, names)
+    placed = infer_frames(checked, limbs, given, names.take)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
     complete, deviations = _with_motors(checked, placed, actuated, limbs, source)
     keyframes = others.pop("keyframes", {})

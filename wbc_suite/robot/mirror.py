@@ -9,21 +9,20 @@ as in vendors' models. Definitions of the file override the reflection.
 """
 
 import re
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wbc_suite.errors import DescriptionError
-from wbc_suite.robot.elements import Joint, Link, Name
+from wbc_suite.robot.elements import Elements, Joint, Link, Name
 from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
 from wbc_suite.robot.poses import HasPose, rotation_matrix
 from wbc_suite.robot.shapes import Capsule, Cylinder, Hull, Loft, Shape
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 
-if TYPE_CHECKING:
-    from wbc_suite.robot.robot_file import Component
+E = TypeVar("E", bound=Elements)
 
 NAMED = ("frames", "mounts", "cameras", "sensors", "actuators", "connects")
 
@@ -39,27 +38,24 @@ class Mirror(FrozenModel):
     plane: Literal["xz", "yz", "xy"] = "xz"
 
 
-def reflect_component(component: "Component", *, source: str) -> "Component":
-    """Return the component with both sides; raises DescriptionError."""
-    mirror = component.mirror
-    if mirror is None:
-        return component
-    reflection = _Reflection(mirror, component)
-    if not any(reflection.matches(link.name) for link in component.links):
+def reflect(elements: E, mirror: Mirror, *, source: str) -> E:
+    """Return elements with both sides; raises DescriptionError."""
+    reflection = _Reflection(mirror, elements)
+    if not any(reflection.matches(link.name) for link in elements.links):
         raise DescriptionError(
             f"{source}: key 'mirror.source' = '{mirror.source}': no link has this word "
             "in its name."
         )
-    return component.model_copy(update=reflection.changes() | {"mirror": None})
+    return elements.model_copy(update=reflection.changes())
 
 
 class _Reflection:
-    """The reflection of one component."""
+    """The reflection of the elements of one component."""
 
-    def __init__(self, mirror: Mirror, component: "Component") -> None:
+    def __init__(self, mirror: Mirror, elements: Elements) -> None:
         self._mirror = mirror
         self._word = re.compile(rf"(?<![^_]){re.escape(mirror.source)}(?![^_])")
-        self._component = component
+        self._elements = elements
         missing = {"xz": 1, "yz": 0, "xy": 2}[mirror.plane]
         self._s = np.eye(3)
         self._s[missing, missing] = -1.0
@@ -68,8 +64,8 @@ class _Reflection:
         self._inside: dict[str, Matrix] = {}
 
     def changes(self) -> dict[str, Any]:
-        """Return every field of the component with the mirrored items added."""
-        c = self._component
+        """Return every field that has mirrored items, with these added."""
+        c = self._elements
         links = self._links()
         return {
             "links": links,
@@ -90,9 +86,9 @@ class _Reflection:
         return self._word.sub(self._mirror.target, name, count=1)
 
     def _links(self) -> tuple[Link, ...]:
-        own = {link.name: link for link in self._component.links}
+        own = {link.name: link for link in self._elements.links}
         made: list[Link] = []
-        for link in self._component.links:
+        for link in self._elements.links:
             self._turn(link)
             if not self.matches(link.name):
                 self._set_d(link.name, link.name)

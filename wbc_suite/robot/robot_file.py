@@ -24,7 +24,7 @@ from wbc_suite.robot.elements import (
     Sensor,
     Synergy,
 )
-from wbc_suite.robot.mirror import Mirror, reflect_component
+from wbc_suite.robot.mirror import Mirror, reflect
 from wbc_suite.robot.shapes import Posed, as_table
 from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml
 
@@ -167,6 +167,14 @@ def _parsed(files: tuple[tuple[str, str], ...]) -> Component | Assembly:
         f"{source}: a robot file needs a table [component] (links and joints) or "
         f"[assembly] (parts); found {', '.join(sorted(own)) or 'nothing'}."
     )
+
+
+def reflect_component(component: Component, *, source: str) -> Component:
+    """Return the component with both sides; raises DescriptionError."""
+    if component.mirror is None:
+        return component
+    both = reflect(component, component.mirror, source=source)
+    return both.model_copy(update={"mirror": None})
 
 
 def _joined(layers: Sequence[Mapping[str, Any]], key: str) -> Any:

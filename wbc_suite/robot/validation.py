@@ -1,29 +1,27 @@
 """Check a robot description: names, tree, physics, references."""
 
 import itertools
-from collections.abc import Collection, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterator, Mapping
 
 from wbc_suite.errors import did_you_mean, join_first
-from wbc_suite.robot.elements import rigid_bodies
+from wbc_suite.robot.elements import Elements, Link, Synergy, rigid_bodies
 from wbc_suite.robot.inertia import implausible, unphysical
-
-if TYPE_CHECKING:
-    from wbc_suite.robot.description import RobotDescription
-    from wbc_suite.robot.elements import Link
 
 RESERVED = ("root", "root_x", "root_y", "root_yaw", "world")
 """Names of the root's joints and of the world; links, joints and frames differ."""
 
+Synergies = Mapping[str, tuple[Synergy, ...]]
+"""Gripper commands, by gripper."""
 
-def check_description(robot: "RobotDescription") -> None:
+
+def check_description(robot: Elements, synergies: Synergies) -> None:
     """Raise ValueError with the first faults found, each as one sentence."""
     faults = [
         *_tree_faults(robot),
         *_mass_faults(robot),
         *_name_faults(robot),
         *(fault for link in robot.links for fault in _inertia_faults(link)),
-        *_reference_faults(robot),
+        *_reference_faults(robot, synergies),
         *_shape_faults(robot),
         *_mimic_faults(robot),
         *_keyframe_faults(robot),
@@ -39,7 +37,7 @@ def _unknown(kind: str, name: str, known: Collection[str], where: str) -> str:
     return f"{where} names {kind} '{name}', which does not exist.{hint}"
 
 
-def _tree_faults(robot: "RobotDescription") -> Iterator[str]:
+def _tree_faults(robot: Elements) -> Iterator[str]:
     names = {link.name for link in robot.links}
     roots = [link.name for link in robot.links if link.parent is None]
     if len(roots) != 1:
@@ -58,7 +56,7 @@ def _tree_faults(robot: "RobotDescription") -> Iterator[str]:
         yield f"the first link '{robot.links[0].name}' has a joint; use [root] instead"
 
 
-def _mass_faults(robot: "RobotDescription") -> Iterator[str]:
+def _mass_faults(robot: Elements) -> Iterator[str]:
     """Check that every moving rigid body has a mass and an inertia tensor."""
     rigid = rigid_bodies(robot.links)
     heavy = {rigid[link.name] for link in robot.links if link.mass > 0.0}
@@ -72,7 +70,7 @@ def _mass_faults(robot: "RobotDescription") -> Iterator[str]:
                 yield f"link '{link.name}' moves and needs an inertia"
 
 
-def _name_faults(robot: "RobotDescription") -> Iterator[str]:
+def _name_faults(robot: Elements) -> Iterator[str]:
     owner: dict[str, str] = dict.fromkeys(RESERVED, "a reserved name")
     items = [("link", link.name) for link in robot.links]
     items += [("joint", name) for name in robot.joint_names]
@@ -92,7 +90,7 @@ def _name_faults(robot: "RobotDescription") -> Iterator[str]:
             yield f"{kind} '{name}' is defined twice"
 
 
-def _inertia_faults(link: "Link") -> Iterator[str]:
+def _inertia_faults(link: Link) -> Iterator[str]:
     where = f"link '{link.name}'"
     fault = unphysical(link)
     if fault is not None:
@@ -103,18 +101,20 @@ def _inertia_faults(link: "Link") -> Iterator[str]:
             yield f"{where}: {text}"
 
 
-def _reference_faults(robot: "RobotDescription") -> Iterator[str]:
+def _reference_faults(robot: Elements, synergies: Synergies) -> Iterator[str]:
     known = {
         "link": [link.name for link in robot.links],
         "frame": [frame.name for frame in robot.frames],
         "joint": list(robot.joint_names),
     }
-    for where, kind, name in _references(robot):
+    for where, kind, name in _references(robot, synergies):
         if name not in known[kind]:
             yield _unknown(kind, name, known[kind], where)
 
 
-def _references(robot: "RobotDescription") -> Iterator[tuple[str, str, str]]:
+def _references(
+    robot: Elements, synergies: Synergies
+) -> Iterator[tuple[str, str, str]]:
     """Yield every reference by name: (where, kind, name)."""
     for item in (*robot.frames, *robot.mounts, *robot.cameras):
         yield f"{type(item).__name__.lower()} '{item.name}'", "link", item.link
@@ -129,12 +129,12 @@ def _references(robot: "RobotDescription") -> Iterator[tuple[str, str, str]]:
     for name, step in ((t.name, step) for t in robot.tendons for step in t.path):
         kind = "frame" if step.joint is None else "joint"
         yield f"tendon '{name}'", kind, str(step.joint or step.frame)
-    for gripper, synergies in robot.synergies.items():
-        for synergy, joint in ((s.name, joint) for s in synergies for joint in s.open):
+    for gripper, own in synergies.items():
+        for synergy, joint in ((s.name, joint) for s in own for joint in s.open):
             yield f"synergy '{synergy}' of '{gripper}'", "joint", joint
 
 
-def _shape_faults(robot: "RobotDescription") -> Iterator[str]:
+def _shape_faults(robot: Elements) -> Iterator[str]:
     known = {*robot.materials, "grey"}
     for link in robot.links:
         for shape in link.visual:
@@ -148,7 +148,7 @@ def _shape_faults(robot: "RobotDescription") -> Iterator[str]:
                 )
 
 
-def _mimic_faults(robot: "RobotDescription") -> Iterator[str]:
+def _mimic_faults(robot: Elements) -> Iterator[str]:
     joints = {joint.name: joint for joint in robot.joints}
     for joint in robot.joints:
         if joint.mimic is None:
@@ -163,7 +163,7 @@ def _mimic_faults(robot: "RobotDescription") -> Iterator[str]:
             yield f"{where} has 'mimic.closed', but the robot has no [[connect]]"
 
 
-def _keyframe_faults(robot: "RobotDescription") -> Iterator[str]:
+def _keyframe_faults(robot: Elements) -> Iterator[str]:
     joints = {joint.name: joint for joint in robot.joints}
     for name, values in robot.keyframes.items():
         for joint_name, value in values.items():
@@ -177,7 +177,7 @@ def _keyframe_faults(robot: "RobotDescription") -> Iterator[str]:
                 )
 
 
-def _group_faults(robot: "RobotDescription") -> Iterator[str]:
+def _group_faults(robot: Elements) -> Iterator[str]:
     """Check that the groups partition the joints that have a motor."""
     joints = {joint.name: joint for joint in robot.joints}
     owner: dict[str, str] = {}

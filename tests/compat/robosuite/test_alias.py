@@ -63,6 +63,28 @@ def test_names_are_where_they_were(suite, module, names):
         assert getattr(found, name) is not None
 
 
+@pytest.mark.parametrize(
+    ("package", "name"),
+    [
+        ("wrappers", "GymWrapper"),
+        ("controllers", "load_part_controller_config"),
+        ("models.objects", "BoxObject"),
+        ("environments", "MujocoEnv"),
+    ],
+)
+def test_packages_list_the_names_of_their_modules(suite, package, name):
+    names = {}
+    exec(f"from robosuite.{package} import *", names)
+    assert name in names
+    assert name in dir(importlib.import_module(f"robosuite.{package}"))
+
+
+def test_calls_without_an_effect_take_any_arguments_and_say_why(suite):
+    viewer = importlib.import_module("robosuite.renderers").Viewer()
+    assert viewer.set_camera(camera_id=0, width=64) is None
+    assert viewer.set_camera.__doc__.startswith("Do nothing: ")
+
+
 def test_statement_imports_need_only_the_alias():
     script = (
         "import sys, wbc_suite.compat.robosuite as r; sys.modules['robosuite'] = r\n"

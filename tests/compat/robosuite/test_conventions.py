@@ -7,7 +7,7 @@ import pytest
 
 import wbc_suite
 import wbc_suite.compat.robosuite as suite
-from wbc_suite.compat.robosuite.datasets import make_from_env_args
+from wbc_suite.compat.robosuite.environments import make_from_env_args
 from wbc_suite.errors import ConfigError
 
 PLAIN = {"use_camera_obs": False, "initialization_noise": None, "seed": 0}

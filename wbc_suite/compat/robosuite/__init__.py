@@ -14,20 +14,20 @@ from typing import TYPE_CHECKING, Any
 from wbc_suite.compat.robosuite.alias import SUBMODULES, install_alias, install_finder
 
 if TYPE_CHECKING:
-    from wbc_suite.compat.robosuite.controllers import (
+    from wbc_suite.compat.robosuite.controllers.configs import (
         ALL_COMPOSITE_CONTROLLERS,
         ALL_PART_CONTROLLERS,
         load_composite_controller_config,
         load_part_controller_config,
     )
-    from wbc_suite.compat.robosuite.datasets import (
+    from wbc_suite.compat.robosuite.environments import (
         make_from_dataset,
         make_from_env_args,
     )
-    from wbc_suite.compat.robosuite.environments import ALL_ENVIRONMENTS, make
+    from wbc_suite.compat.robosuite.environments.base import ALL_ENVIRONMENTS, make
     from wbc_suite.compat.robosuite.models.grippers import ALL_GRIPPERS
     from wbc_suite.compat.robosuite.robots import ALL_ROBOTS
-    from wbc_suite.compat.robosuite.wrappers import GymWrapper
+    from wbc_suite.compat.robosuite.wrappers.gym import GymWrapper
 
 __all__ = [
     "ALL_COMPOSITE_CONTROLLERS",
@@ -47,28 +47,21 @@ __all__ = [
 __version__ = "1.5.2"  # the robosuite version of this interface
 __logo__ = "wbc_suite, with robosuite's interface"
 
-_PLACES = {
-    "make": "environments.base",
-    "make_from_dataset": "datasets",
-    "make_from_env_args": "datasets",
-    "ALL_ENVIRONMENTS": "environments",
-    "ALL_ROBOTS": "robots",
-    "ALL_GRIPPERS": "models.grippers",
-    "ALL_PART_CONTROLLERS": "controllers",
-    "ALL_COMPOSITE_CONTROLLERS": "controllers",
-    "load_composite_controller_config": "controllers",
-    "load_part_controller_config": "controllers",
-    "GymWrapper": "wrappers",
-    "ROBOSUITE_DEFAULT_LOGGER": "utils.log_utils",
-    **dict.fromkeys(
-        (
-            *("Lift", "Stack", "NutAssembly", "PickPlace", "Door", "Wipe", "ToolHang"),
-            *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover", "TwoArmTransport"),
-        ),
-        "environments.manipulation",
-    ),
+_NAMES = {
+    "controllers": """
+        ALL_COMPOSITE_CONTROLLERS ALL_PART_CONTROLLERS load_composite_controller_config
+        load_part_controller_config""",
+    "environments": "ALL_ENVIRONMENTS make make_from_dataset make_from_env_args",
+    "environments.manipulation": """
+        Lift Stack NutAssembly PickPlace Door Wipe ToolHang TwoArmLift TwoArmPegInHole
+        TwoArmHandover TwoArmTransport""",
+    "models.grippers": "ALL_GRIPPERS",
+    "robots": "ALL_ROBOTS",
+    "utils": "ROBOSUITE_DEFAULT_LOGGER",
+    "wrappers": "GymWrapper",
 }
-"""Names of robosuite's top level, and the modules that define them."""
+"""Names of robosuite's top level, by the modules that define them."""
+_PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 install_finder()
 

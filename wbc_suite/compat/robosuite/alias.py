@@ -21,100 +21,64 @@ SUBMODULES = (
 )
 """Modules directly below `robosuite`."""
 
-_TASKS = (
-    *("lift", "stack", "nut_assembly", "pick_place", "door", "wipe", "tool_hang"),
-    *("two_arm_lift", "two_arm_peg_in_hole", "two_arm_handover", "two_arm_transport"),
-    *("manipulation_env", "two_arm_env"),
-)
-_GRIPPERS = (
-    *("gripper_model", "gripper_factory", "panda_gripper"),
-    *("rethink_gripper", "robotiq_85_gripper", "robotiq_140_gripper"),
-    *("robotiq_three_finger_gripper", "jaco_three_finger_gripper", "bd_gripper"),
-    *("wiping_gripper", "null_gripper", "inspire_hands", "fourier_hands"),
-    "xarm7_gripper",
-)
-_BASES = (
-    *("mount_model", "robot_base_model", "robot_base_factory", "mobile_base_model"),
-    *("leg_base_model", "null_base_model", "rethink_mount", "rethink_minimal_mount"),
-    *("null_mount", "omron_mobile_base", "null_mobile_base", "no_actuation_base"),
-    *("floating_legged_base", "null_base", "spot_base"),
-)
-_ROBOTS = (
-    *("robot_model", "manipulators", "compositional"),
-    *(
-        f"manipulators.{name}_robot"
-        for name in (
-            *("baxter", "gr1", "iiwa", "jaco", "kinova3", "panda", "sawyer"),
-            *("tiago", "ur5e", "xarm7"),
-        )
-    ),
-    *("manipulators.manipulator_model", "manipulators.spot_arm"),
-    *("manipulators.humanoid_model", "manipulators.legged_manipulator_model"),
-)
-_ARENAS = (
-    *("arena", "table_arena", "multi_table_arena", "pegs_arena", "bins_arena"),
-    *("empty_arena", "wipe_arena"),
-)
+PARTS_OF = {
+    "controllers": """
+        composite composite.composite_controller composite.composite_controller_factory
+        parts parts.controller parts.controller_factory parts.arm parts.arm.osc
+        parts.arm.ik parts.generic parts.generic.joint_pos parts.generic.joint_vel
+        parts.generic.joint_tor parts.gripper parts.gripper.gripper_controller
+        parts.gripper.simple_grip parts.mobile_base parts.mobile_base.joint_vel
+        parts.mobile_base.mobile_base_controller""",
+    "devices": "device keyboard spacemouse",
+    "environments.manipulation": """
+        lift stack nut_assembly pick_place door wipe tool_hang two_arm_lift
+        two_arm_peg_in_hole two_arm_handover two_arm_transport manipulation_env
+        two_arm_env""",
+    "models.arenas": """
+        arena table_arena multi_table_arena pegs_arena bins_arena empty_arena
+        wipe_arena""",
+    "models.bases": """
+        mount_model robot_base_model robot_base_factory mobile_base_model
+        leg_base_model null_base_model rethink_mount rethink_minimal_mount null_mount
+        omron_mobile_base null_mobile_base no_actuation_base floating_legged_base
+        null_base spot_base""",
+    "models.grippers": """
+        gripper_model gripper_factory gripper_tester panda_gripper rethink_gripper
+        robotiq_85_gripper robotiq_140_gripper robotiq_three_finger_gripper
+        jaco_three_finger_gripper bd_gripper wiping_gripper null_gripper inspire_hands
+        fourier_hands xarm7_gripper""",
+    "models.objects": """
+        objects generated_objects xml_objects primitive primitive.box primitive.ball
+        primitive.capsule primitive.cylinder composite object_groups group
+        composite_body composite.bin composite.hammer composite.lid
+        composite.hollow_cylinder composite.pot_with_handles composite.hook_frame
+        composite.stand_with_mount""",
+    "models.robots": """
+        robot_model compositional manipulators manipulators.baxter_robot
+        manipulators.gr1_robot manipulators.iiwa_robot manipulators.jaco_robot
+        manipulators.kinova3_robot manipulators.panda_robot manipulators.sawyer_robot
+        manipulators.tiago_robot manipulators.ur5e_robot manipulators.xarm7_robot
+        manipulators.manipulator_model manipulators.spot_arm
+        manipulators.humanoid_model manipulators.legged_manipulator_model""",
+    "models.tasks": "manipulation_task task",
+    "renderers": "base viewer mjviewer mjviewer.mjviewer_renderer",
+    "robots": "fixed_base_robot mobile_robot wheeled_robot legged_robot",
+    "utils": "errors log_utils usd usd.exporter usd_export",
+    "wrappers": """
+        wrapper gym_wrapper data_collection_wrapper visualization_wrapper
+        domain_randomization_wrapper demo_sampler_wrapper""",
+}
+"""Packages, and the modules below them that re-export their names."""
 
 REEXPORTS = {
-    **{f"environments.manipulation.{t}": "environments.manipulation" for t in _TASKS},
-    **{f"models.grippers.{g}": "models.grippers" for g in _GRIPPERS},
-    **{f"models.bases.{b}": "models.bases" for b in _BASES},
-    **{f"models.robots.{r}": "models.robots" for r in _ROBOTS},
-    **{f"models.arenas.{a}": "models.arenas" for a in _ARENAS},
-    **{
-        f"robots.{r}": "robots"
-        for r in (
-            *("fixed_base_robot", "mobile_robot"),
-            *("wheeled_robot", "legged_robot"),
-        )
-    },
-    **{
-        f"models.objects.{o}": "models.objects"
-        for o in (
-            *("objects", "generated_objects", "xml_objects", "primitive"),
-            *("primitive.box", "primitive.ball", "primitive.capsule"),
-            *("primitive.cylinder", "composite", "object_groups", "group"),
-            *("composite_body", "composite.bin", "composite.hammer", "composite.lid"),
-            *("composite.hollow_cylinder", "composite.pot_with_handles"),
-            *("composite.hook_frame", "composite.stand_with_mount"),
-        )
-    },
-    "models.tasks.manipulation_task": "models.tasks",
-    "models.tasks.task": "models.tasks",
+    f"{package}.{module}": package
+    for package, modules in PARTS_OF.items()
+    for module in modules.split()
+} | {
     "models.world": "models.tasks",
-    "controllers.composite": "controllers",
-    "controllers.composite.composite_controller": "controllers",
-    "controllers.composite.composite_controller_factory": "controllers",
-    "controllers.parts": "controllers",
-    "controllers.parts.controller_factory": "controllers",
-    **{
-        f"controllers.parts.{p}": "controllers"
-        for p in (
-            *("controller", "arm", "arm.osc", "arm.ik", "generic", "gripper"),
-            *("generic.joint_pos", "generic.joint_vel", "generic.joint_tor"),
-            *("gripper.gripper_controller", "gripper.simple_grip", "mobile_base"),
-            *("mobile_base.mobile_base_controller", "mobile_base.joint_vel"),
-        )
-    },
-    "wrappers.wrapper": "wrappers",
-    "wrappers.gym_wrapper": "wrappers",
-    "wrappers.data_collection_wrapper": "wrappers",
-    "wrappers.visualization_wrapper": "wrappers",
-    "wrappers.domain_randomization_wrapper": "wrappers",
-    "wrappers.demo_sampler_wrapper": "wrappers",
-    "devices.keyboard": "devices",
-    "devices.spacemouse": "devices",
-    "renderers.base": "renderers",
-    "renderers.viewer": "renderers",
-    "renderers.mjviewer": "renderers",
-    "renderers.mjviewer.mjviewer_renderer": "renderers",
-    "utils.opencv_renderer": "renderers",
     "utils.numba": "utils.control_utils",
+    "utils.opencv_renderer": "renderers",
     "utils.robot_utils": "utils.robot_composition_utils",
-    "models.grippers.gripper_tester": "models.grippers.tester",
-    "utils.usd": "utils.usd_export",
-    "utils.usd.exporter": "utils.usd_export",
 }
 """Modules that re-export the names of another, and that other; both below `ROOT`."""
 

@@ -1,26 +1,30 @@
-"""Kinds of controlled frames, and where to register one's own.
+"""Controlled frames, their kinds, and where to register one's own.
 
 A kind defines which components of a pose a slice of the action commands. The classes
 below are registered like one's own: by `register_frame_kind`.
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar, TypeVar
+from typing import Annotated, ClassVar, TypeVar
 
 import numpy as np
 import pinocchio as pin
+from pydantic import (
+    AfterValidator,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    model_validator,
+)
 
 from wbc_suite.control.action import FULL_TURN, ActionPart, Axis, SliceKind, Unit
+from wbc_suite.control.part.part_settings import InputFrame, InputType, check_axes
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.qp import ComTask, FrameTask
 from wbc_suite.registry import Registry
+from wbc_suite.robot.elements import Name
+from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
-
-if TYPE_CHECKING:
-    from wbc_suite.control.composite.whole_body_config import (
-        ControlledFrame,
-        GoalsConfig,
-    )
 
 MAX_POSITION = 10.0
 """Bound of absolute positions, m: no robot here reaches farther."""
@@ -160,6 +164,86 @@ def register_frame_kind(kind: type[Kind], *, replace: bool = False) -> type[Kind
         )
     FRAME_KINDS.register(kind.name, kind(), replace=replace)
     return kind
+
+
+def _registered(kind: str) -> str:
+    try:
+        return FRAME_KINDS.spelled(kind)
+    except UnknownNameError as error:
+        raise ValueError(str(error)) from error
+
+
+class ControlledFrame(FrozenModel):
+    """A frame that an action slice moves.
+
+    Attributes:
+        name: Name of the slice.
+        frame: Frame or link of the robot; absent for the centre of mass.
+        kind: A registered kind: `pose`, `position`, `orientation`, `com`, `base` (x, y
+            and yaw), or one's own; see `frame_kinds`.
+        position_cost: [cost]/m.
+        orientation_cost: [cost]/rad.
+        gain: Fraction of the error that one solve removes, (0, 1].
+        level: Strict priority, 0 first.
+        max_linear_speed: Greatest speed asked for, m/s.
+        max_angular_speed: Greatest angular speed asked for, rad/s.
+        linear_braking: Deceleration towards the goal, m/s^2.
+        angular_braking: Deceleration towards the goal, rad/s^2.
+        range: How far from its pose at reset the frame may be sent, m and rad; goals
+            beyond are brought back to there. Keeps a standing robot on its feet.
+    """
+
+    name: Name
+    frame: Name | None = None
+    kind: Annotated[str, AfterValidator(_registered)] = "pose"
+    position_cost: NonNegativeFloat = 1.0
+    orientation_cost: NonNegativeFloat = 1.0
+    gain: float = Field(default=0.5, gt=0.0, le=1.0)
+    level: int = Field(default=0, ge=0, le=3)
+    max_linear_speed: PositiveFloat = 2.0
+    max_angular_speed: PositiveFloat = 6.0
+    linear_braking: PositiveFloat = 4.0
+    angular_braking: PositiveFloat = 12.0
+    range: tuple[PositiveFloat, PositiveFloat] | None = None
+
+    @model_validator(mode="after")
+    def _frame_given(self) -> "ControlledFrame":
+        if (self.frame is not None) != self.behaviour.needs_frame:
+            rule = "is needed" if self.behaviour.needs_frame else "must be absent"
+            raise ValueError(f"'frame' {rule} for kind '{self.kind}'")
+        return self
+
+    @property
+    def behaviour(self) -> FrameKind:
+        """What frames of the kind have in common."""
+        return FRAME_KINDS[self.kind]
+
+
+class GoalsConfig(FrozenModel):
+    """Controlled frames, and how an action moves their goals.
+
+    Attributes:
+        frames: Controlled frames, in the order of the action.
+        input_type: `absolute` targets, or `delta` steps from the last target.
+        input_ref_frame: Axes of targets and steps: `world`, the robot's `base`, or the
+            controlled frame's own (`eef`, deltas only).
+        delta_position: Largest step of a delta action, m.
+        delta_rotation: Largest step of a delta action, rad.
+    """
+
+    frames: tuple[ControlledFrame, ...] = Field(default=(), alias="frame")
+    input_type: InputType = "absolute"
+    input_ref_frame: InputFrame = "world"
+    delta_position: PositiveFloat = 0.05
+    delta_rotation: PositiveFloat = 0.5
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "GoalsConfig":
+        names = [frame.name for frame in self.frames]
+        if len({*names}) != len(names):
+            raise ValueError(f"controlled frames share a name: {names}")
+        check_axes(self.input_type, self.input_ref_frame)
+        return self
 
 
 def set_target(task: GoalTask, row: Vector) -> None:

@@ -2,21 +2,20 @@
 
 from collections.abc import Collection, Iterator, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, Union
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import (
     AfterValidator,
     Field,
     NonNegativeFloat,
     PositiveFloat,
-    model_validator,
 )
 
-from wbc_suite.control.composite.frame_kinds import FRAME_KINDS, FrameKind
+from wbc_suite.control.composite.frame_kinds import ControlledFrame, GoalsConfig
 from wbc_suite.control.composite.reduced_robot import gripper_groups
 from wbc_suite.control.law.joint_laws import JointLawConfig
 from wbc_suite.control.part.feasible_acceleration import weight_shares
-from wbc_suite.control.part.part_settings import InputFrame, InputType, check_axes
+from wbc_suite.control.part.part_settings import InputFrame, InputType
 from wbc_suite.control.part.stance_controller import HeldFrame
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.qp import LIMITS, TASKS
@@ -36,19 +35,9 @@ __all__ = [
     "LimitsConfig",
     "PostureConfig",
     "WholeBodyIKConfig",
-    "check_goals",
     "default_whole_body_config",
     "read_whole_body",
 ]
-
-if TYPE_CHECKING:
-    from wbc_suite.control.composite.whole_body_dynamics_config import (
-        WholeBodyIDConfig,
-    )
-
-GoalsConfig: TypeAlias = Union["WholeBodyIKConfig", "WholeBodyIDConfig"]
-"""Configs with controlled frames, and how an action moves their goals."""
-
 
 FEW_JOINTS = 0.02  # [cost]/rad of a hand that less than six joints move
 CLOSE_FIT = 0.0025  # m; small arms have links 5 mm apart wherever they are
@@ -69,59 +58,6 @@ LimitTable: TypeAlias = Annotated[
     dict[str, Any], AfterValidator(partial(_with_type, LIMITS))
 ]
 """The `type` of a registered task or limit, and its arguments."""
-
-
-def _registered(kind: str) -> str:
-    try:
-        return FRAME_KINDS.spelled(kind)
-    except UnknownNameError as error:
-        raise ValueError(str(error)) from error
-
-
-class ControlledFrame(FrozenModel):
-    """A frame that an action slice moves.
-
-    Attributes:
-        name: Name of the slice.
-        frame: Frame or link of the robot; absent for the centre of mass.
-        kind: A registered kind: `pose`, `position`, `orientation`, `com`, `base` (x, y
-            and yaw), or one's own; see `frame_kinds`.
-        position_cost: [cost]/m.
-        orientation_cost: [cost]/rad.
-        gain: Fraction of the error that one solve removes, (0, 1].
-        level: Strict priority, 0 first.
-        max_linear_speed: Greatest speed asked for, m/s.
-        max_angular_speed: Greatest angular speed asked for, rad/s.
-        linear_braking: Deceleration towards the goal, m/s^2.
-        angular_braking: Deceleration towards the goal, rad/s^2.
-        range: How far from its pose at reset the frame may be sent, m and rad; goals
-            beyond are brought back to there. Keeps a standing robot on its feet.
-    """
-
-    name: Name
-    frame: Name | None = None
-    kind: Annotated[str, AfterValidator(_registered)] = "pose"
-    position_cost: NonNegativeFloat = 1.0
-    orientation_cost: NonNegativeFloat = 1.0
-    gain: float = Field(default=0.5, gt=0.0, le=1.0)
-    level: int = Field(default=0, ge=0, le=3)
-    max_linear_speed: PositiveFloat = 2.0
-    max_angular_speed: PositiveFloat = 6.0
-    linear_braking: PositiveFloat = 4.0
-    angular_braking: PositiveFloat = 12.0
-    range: tuple[PositiveFloat, PositiveFloat] | None = None
-
-    @model_validator(mode="after")
-    def _frame_given(self) -> "ControlledFrame":
-        if (self.frame is not None) != self.behaviour.needs_frame:
-            rule = "is needed" if self.behaviour.needs_frame else "must be absent"
-            raise ValueError(f"'frame' {rule} for kind '{self.kind}'")
-        return self
-
-    @property
-    def behaviour(self) -> FrameKind:
-        """What frames of the kind have in common."""
-        return FRAME_KINDS[self.kind]
 
 
 class PostureConfig(FrozenModel):
@@ -190,7 +126,7 @@ class LimitsConfig(FrozenModel):
     balance_margin: NonNegativeFloat = 0.03
 
 
-class WholeBodyIKConfig(FrozenModel):
+class WholeBodyIKConfig(GoalsConfig):
     """Config of a whole-body IK controller.
 
     Attributes:
@@ -204,11 +140,6 @@ class WholeBodyIKConfig(FrozenModel):
         locked: Groups of joints that are kept at the posture.
         posture: Pull to a posture.
         limits: Limits of the command.
-        input_type: `absolute` targets, or `delta` steps from the last target.
-        input_ref_frame: Axes of targets and steps: `world`, the robot's `base`, or the
-            controlled frame's own (`eef`, deltas only).
-        delta_position: Largest step of a delta action, m.
-        delta_rotation: Largest step of a delta action, rad.
         solve_hz: Solves per second.
         joint_law: Gains of the joint-position law.
         planning: Whether to plan motions around obstacles and local minima; else all
@@ -229,29 +160,13 @@ class WholeBodyIKConfig(FrozenModel):
     locked: tuple[Name, ...] = ()
     posture: PostureConfig = PostureConfig()
     limits: LimitsConfig = LimitsConfig()
-    input_type: InputType = "absolute"
     input_ref_frame: InputFrame = "world"
-    delta_position: PositiveFloat = 0.05
-    delta_rotation: PositiveFloat = 0.5
     solve_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 100.0
     joint_law: JointLawConfig = JointLawConfig()
     planning: bool = True
     far: tuple[PositiveFloat, PositiveFloat] = (0.15, 0.6)
     search_iterations: int = Field(default=25, ge=0)
     tolerance: tuple[PositiveFloat, PositiveFloat] = (1e-3, 3.5e-3)
-
-    @model_validator(mode="after")
-    def _consistent(self) -> "WholeBodyIKConfig":
-        check_goals(self)
-        return self
-
-
-def check_goals(config: GoalsConfig) -> None:
-    """Raise ValueError where frames share a name, or axes do not fit the input."""
-    names = [frame.name for frame in config.frames]
-    if len({*names}) != len(names):
-        raise ValueError(f"controlled frames share a name: {names}")
-    check_axes(config.input_type, config.input_ref_frame)
 
 
 def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:

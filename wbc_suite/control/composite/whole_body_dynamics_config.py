@@ -12,11 +12,9 @@ from pydantic import (
     model_validator,
 )
 
+from wbc_suite.control.composite.frame_kinds import ControlledFrame, GoalsConfig
 from wbc_suite.control.composite.whole_body_config import (
-    ControlledFrame,
     InputFrame,
-    InputType,
-    check_goals,
     default_whole_body_config,
 )
 from wbc_suite.control.dynamics.state_source import StateSourceConfig
@@ -89,7 +87,7 @@ class StanceConfig(FrozenModel):
     weights: dict[Name, PositiveFloat] = {}
 
 
-class WholeBodyIDConfig(FrozenModel):
+class WholeBodyIDConfig(GoalsConfig):
     """Config of whole-body inverse dynamics.
 
     Attributes:
@@ -108,11 +106,8 @@ class WholeBodyIDConfig(FrozenModel):
         max_walk: Greatest commands: forward, left (m/s), turn (rad/s).
         height: Lowest and highest command of height, m.
         tolerance: Errors below which a hand has reached its target, m and rad.
-        input_type: `absolute` targets of hands, or `delta` steps from the last target.
-        input_ref_frame: Axes of hands' targets and steps: `world`; `base`, which is the
-            heading of the robot at its centre of mass; or the hand's own (`eef`).
-        delta_position: Largest step of a delta action, m.
-        delta_rotation: Largest step of a delta action, rad.
+        input_ref_frame: Axes of hands' targets and steps, of which `base` is the
+            heading of the robot at its centre of mass.
     """
 
     format: Literal[1] = 1
@@ -128,10 +123,7 @@ class WholeBodyIDConfig(FrozenModel):
     max_walk: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (1.0, 0.4, 1.0)
     height: Interval = (-0.15, 0.02)
     tolerance: tuple[PositiveFloat, PositiveFloat] = (2e-3, 1e-2)
-    input_type: InputType = "absolute"
     input_ref_frame: InputFrame = "base"
-    delta_position: PositiveFloat = 0.05
-    delta_rotation: PositiveFloat = 0.5
 
     @property
     def cutoff(self) -> float:
@@ -141,7 +133,6 @@ class WholeBodyIDConfig(FrozenModel):
 
     @model_validator(mode="after")
     def _gait_fits_feet(self) -> "WholeBodyIDConfig":
-        check_goals(self)
         if self.gait is None:
             if self.feet:
                 raise ValueError("feet need a [gait]: type 'walk' or 'trot'")

@@ -1,6 +1,6 @@
 """robomimic's HDF5 layout with its own columns only, for its training and roll-outs.
 
-Observations are those of `wbc_suite.compat.robosuite`, in which robomimic rolls out.
+Observations are those of robosuite's interface, in which robomimic rolls out.
 """
 
 import json
@@ -54,8 +54,7 @@ def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> 
 def _header(header: Mapping[str, Fact]) -> dict[str, Fact]:
     """Return attributes with which robomimic makes the environment of robosuite's name.
 
-    `wbc_suite.compat.robosuite` has robosuite's default controllers, sites and signs;
-    ours are named.
+    There, controllers, sites and signs are robosuite's by default; ours are named.
     """
     if "env_args" not in header:
         return dict(header)

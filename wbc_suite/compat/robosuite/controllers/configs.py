@@ -38,53 +38,29 @@ _GAINS = {
 _FRAME = {"input_type": "delta", "input_ref_frame": "base"}
 _STEP = [0.05, 0.05, 0.05, 0.5, 0.5, 0.5]
 
+
+def _moving(kp: float, output: Any, **more: Any) -> dict[str, Any]:
+    """Return the keys of a part whose actions are steps of at most `output`."""
+    low = [-x for x in output] if isinstance(output, list) else -output
+    keys = {**_INPUT, "output_max": output, "output_min": low, "kp": kp}
+    return keys | more | _RAMP
+
+
 PARTS: dict[str, dict[str, Any]] = {
-    "OSC_POSE": {
-        "type": "OSC_POSE",
-        **_INPUT,
-        "output_max": _STEP,
-        "output_min": [-x for x in _STEP],
-        "kp": 150,
+    "OSC_POSE": _moving(
+        150,
+        _STEP,
         **_GAINS,
-        "position_limits": None,
-        "orientation_limits": None,
-        "uncouple_pos_ori": True,
+        position_limits=None,
+        orientation_limits=None,
+        uncouple_pos_ori=True,
         **_FRAME,
-        **_RAMP,
-    },
-    "OSC_POSITION": {
-        "type": "OSC_POSITION",
-        **_INPUT,
-        "output_max": _STEP[:3],
-        "output_min": [-x for x in _STEP[:3]],
-        "kp": 150,
-        **_GAINS,
-        "position_limits": None,
-        **_FRAME,
-        **_RAMP,
-    },
-    "IK_POSE": {"type": "IK_POSE", "ik_pos_limit": 0.02, "ik_ori_limit": 0.05, **_RAMP},
-    "JOINT_POSITION": {
-        "type": "JOINT_POSITION",
-        **_INPUT,
-        "output_max": 0.05,
-        "output_min": -0.05,
-        "kp": 50,
-        **_GAINS,
-        "qpos_limits": None,
-        **_RAMP,
-    },
-    "JOINT_VELOCITY": {
-        "type": "JOINT_VELOCITY",
-        **_INPUT,
-        "output_max": 0.5,
-        "output_min": -0.5,
-        "kp": 3.0,
-        "velocity_limits": [-1, 1],
-        **_RAMP,
-    },
+    ),
+    "OSC_POSITION": _moving(150, _STEP[:3], **_GAINS, position_limits=None, **_FRAME),
+    "IK_POSE": {"ik_pos_limit": 0.02, "ik_ori_limit": 0.05, **_RAMP},
+    "JOINT_POSITION": _moving(50, 0.05, **_GAINS, qpos_limits=None),
+    "JOINT_VELOCITY": _moving(3.0, 0.5, velocity_limits=[-1, 1]),
     "JOINT_TORQUE": {
-        "type": "JOINT_TORQUE",
         **_INPUT,
         "output_max": 0.1,
         "output_min": -0.1,
@@ -92,6 +68,7 @@ PARTS: dict[str, dict[str, Any]] = {
         **_RAMP,
     },
 }
+PARTS = {kind: {"type": kind, **keys} for kind, keys in PARTS.items()}
 """Default config of each part controller."""
 
 BODY = {

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from wbc_suite.compat.robosuite.forwarding import does_nothing
 from wbc_suite.control import RobotState
 from wbc_suite.typing import Vector
 
@@ -24,11 +25,8 @@ class PartController:
         self.part_name, self._part, self._state = name, part, state
         self.name = _type_of(part)
         self.control_dim = sum(len(s.labels) for s in part.slices)
-        self.joint_index = {
-            "joints": state.joint_addresses(part.law.joints)[1].tolist(),
-            "qpos": state.joint_addresses(part.law.joints)[0].tolist(),
-            "qvel": state.joint_addresses(part.law.joints)[1].tolist(),
-        }
+        q, v = (at.tolist() for at in state.joint_addresses(part.law.joints))
+        self.joint_index = {"joints": v, "qpos": q, "qvel": v}
 
     def __getattr__(self, name: str) -> Any:
         config = getattr(self.__dict__["_part"], "config", None)
@@ -59,29 +57,27 @@ class PartController:
     @property
     def torques(self) -> Vector:
         """Torques that the actuators of its joints exert now, N m or N."""
-        return self._state.data.qfrc_actuator[self.joint_index["qvel"]].copy()
+        return self._state.data.qfrc_actuator[self.joint_index["qvel"]]
 
-    @property
-    def kp(self) -> Vector:
-        """Present stiffness."""
-        return np.array(self._part.law.record["kp"]).ravel()
+    kp = property(lambda self: self._gain("kp"), doc="Present stiffness.")
+    kd = property(lambda self: self._gain("kd"), doc="Present damping.")
 
-    @property
-    def kd(self) -> Vector:
-        """Present damping."""
-        return np.array(self._part.law.record["kd"]).ravel()
+    def _gain(self, name: str) -> Vector:
+        return np.array(self._part.law.record[name]).ravel()
 
     @property
     def goal_pos(self) -> Vector | None:
         """Goal of the hand, in the axes of the goal, m; None without a hand."""
-        goal = self._part.goal
-        return None if isinstance(goal, np.ndarray) else np.array(goal.translation)
+        return self._hand_goal("translation")
 
     @property
     def goal_ori(self) -> Any:
         """Goal orientation of the hand as a matrix; None without a hand."""
+        return self._hand_goal("rotation")
+
+    def _hand_goal(self, field: str) -> Any:
         goal = self._part.goal
-        return None if isinstance(goal, np.ndarray) else np.array(goal.rotation)
+        return None if isinstance(goal, np.ndarray) else np.array(getattr(goal, field))
 
     @property
     def goal_qpos(self) -> Vector | None:
@@ -91,7 +87,7 @@ class PartController:
 
     @property
     def ref_pos(self) -> Vector:
-        """Position of the hand in the world, m."""
+        """Position of the hand, m."""
         return self._site("site_xpos")
 
     @property
@@ -117,8 +113,7 @@ class PartController:
         """Hold the part where it is; `set_robot_joint_positions` has moved it."""
         self.reset_goal()
 
-    def update(self, force: bool = False) -> None:
-        """Do nothing: values are read when they are asked for."""
+    update = does_nothing("values are read when they are asked for")
 
     @property
     def interpolator(self) -> Any:
@@ -127,33 +122,25 @@ class PartController:
         return None if ramp is None else SimpleNamespace(order=1)
 
 
-class OperationalSpaceController(PartController):
-    """OSC_POSE or OSC_POSITION of an arm."""
+Controller = PartController
 
 
-class InverseKinematicsController(PartController):
-    """IK_POSE of an arm."""
+def _kind(name: str, doc: str) -> Any:
+    """Return the class of robosuite that its scripts look for; it adds nothing."""
+    return type(name, (PartController,), {"__module__": __name__, "__doc__": doc})
 
 
-class JointPositionController(PartController):
-    """JOINT_POSITION of a part."""
-
-
-class JointVelocityController(PartController):
-    """JOINT_VELOCITY of a part."""
-
-
-class JointTorqueController(PartController):
-    """JOINT_TORQUE of a part."""
-
-
-class SimpleGripController(PartController):
-    """GRIP of a gripper."""
-
-
-class MobileBaseJointVelocityController(PartController):
-    """JOINT_VELOCITY of a base."""
-
+OperationalSpaceController = _kind(
+    "OperationalSpaceController", "OSC_POSE or OSC_POSITION of an arm."
+)
+InverseKinematicsController = _kind("InverseKinematicsController", "IK_POSE of an arm.")
+JointPositionController = _kind("JointPositionController", "JOINT_POSITION of a part.")
+JointVelocityController = _kind("JointVelocityController", "JOINT_VELOCITY of a part.")
+JointTorqueController = _kind("JointTorqueController", "JOINT_TORQUE of a part.")
+SimpleGripController = _kind("SimpleGripController", "GRIP of a gripper.")
+MobileBaseJointVelocityController = _kind(
+    "MobileBaseJointVelocityController", "JOINT_VELOCITY of a base."
+)
 
 _CLASSES = {
     "OSC_POSE": OperationalSpaceController,

@@ -1,6 +1,6 @@
 """Composite controllers: robosuite's view of ours, and base of users' classes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,10 +10,10 @@ from wbc_suite.compat.robosuite.controllers.part_view import (
     PartController,
     part_controller,
 )
+from wbc_suite.compat.robosuite.forwarding import does_nothing, forwarded
 from wbc_suite.control import RobotState
 from wbc_suite.control.composite.basic import BasicController, default_basic_config
 from wbc_suite.control.composite.registry import register_composite
-from wbc_suite.control.memory import Parts
 from wbc_suite.typing import Vector
 
 REGISTERED_COMPOSITE_CONTROLLERS_DICT: dict[str, type["CompositeController"]] = {}
@@ -66,20 +66,16 @@ class CompositeController:
             n: part_controller(n, p, state) for n, p in parts.items()
         }
 
+    _validate_composite_controller_specific_config = does_nothing("anything is right")
+    _init_controllers = does_nothing("there are the controllers of the parts")
+    setup_action_split_idx = does_nothing("the parts give `_action_split_indexes`")
+    update_state = does_nothing("states are read when they are asked for")
+
     def set_period(self, period: float) -> None:
         """Set the time between two actions, s."""
         self.period = period
         for part in self.part_controllers.values():
             part.period = period
-
-    def _validate_composite_controller_specific_config(self) -> None:
-        """Check the specific config; by default anything is right."""
-
-    def _init_controllers(self) -> None:
-        """Make more controllers; by default there are those of the parts."""
-
-    def setup_action_split_idx(self) -> None:
-        """Do nothing: `_action_split_indexes` follows from the parts."""
 
     @property
     def _action_split_indexes(self) -> dict[str, tuple[int, int]]:
@@ -96,20 +92,13 @@ class CompositeController:
 
     def run_controller(self, enabled_parts: Any = None) -> dict[str, Vector]:
         """Return the present commands of each part, by name."""
-        data, found = self._state.data, {}
-        places = {
-            n: i
-            for n, i in zip(
-                self._state.actuators, self._state.actuator_ids, strict=True
-            )
-        }
+        found: dict[str, Vector] = {}
+        state = self._state
+        places = dict(zip(state.actuators, state.actuator_ids, strict=True))
         for name, part in self.part_controllers.items():
             own = [places[j] for j in part._part.law.joints if j in places]
-            found[name] = data.ctrl[own].copy()
+            found[name] = self._state.data.ctrl[own].copy()
         return found
-
-    def update_state(self) -> None:
-        """Do nothing: states are read when they are asked for."""
 
     def get_control_dim(self, part_name: str) -> int:
         """Return the number of action values of a part."""
@@ -186,9 +175,6 @@ def register_composite_controller(
     return target_class
 
 
-BIND: Callable[[RobotState], tuple[Any, Any, Any]] | None = None
-
-
 class _Adapter:
     """A user's composite controller in our control loop; see `SteppedController`."""
 
@@ -210,29 +196,16 @@ class _Adapter:
             for part, p in self._inner.parts.items()
         }
 
-    @property
-    def hold_action(self) -> Vector:
-        return self._inner.hold_action
-
-    def info(self, state: RobotState) -> dict[str, Any]:
-        return self._inner.info(state)
-
-    @property
-    def memory(self) -> Parts:
-        return self._inner.memory
-
-    def resume(self, state: RobotState) -> None:
-        self._inner.resume(state)
-
-    def reset(self, state: RobotState) -> None:
-        self._inner.reset(state)
+    hold_action = forwarded("_inner", "hold_action", "The action that holds the parts.")
+    info = forwarded("_inner", "info", "Entries of the environment's `info`.")
+    memory = forwarded("_inner", "memory", "Arrays that outlive a tick.")
+    resume = forwarded("_inner", "resume", "Goes on from values in `memory`.")
+    reset = forwarded("_inner", "reset", "Starts from the robot's state.")
+    prepare = forwarded("_inner", "prepare", "Updates the laws.")
 
     def set_goal(self, action: Vector, period: float = 0.05) -> None:
         self.user.set_period(period)
         self.user.set_goal(action)
-
-    def prepare(self, state: RobotState) -> int:
-        return self._inner.prepare(state)
 
     def compute(self, state: RobotState) -> Vector:
         """Return the user's commands; see `SteppedController`."""

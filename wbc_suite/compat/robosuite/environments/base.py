@@ -6,12 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from wbc_suite.compat.robosuite.environments.observations import PolledObservables
-from wbc_suite.compat.robosuite.environments.observing import Observation, Observing
+from wbc_suite.compat.robosuite.environments.observations import (
+    Observation,
+    Observing,
+    PolledObservables,
+)
 from wbc_suite.compat.robosuite.environments.scene_text import (
     load_scene,
     scene_as_it_is,
 )
+from wbc_suite.compat.robosuite.forwarding import does_nothing
 from wbc_suite.compat.robosuite.renderers import Viewer, load_renderer_config
 from wbc_suite.compat.robosuite.utils.binding_utils import (
     MjSim,
@@ -27,6 +31,7 @@ from wbc_suite.typing import Vector
 
 REGISTERED_ENVS: dict[str, type["MujocoEnv"]] = {}
 """Classes of environments by name."""
+ALL_ENVIRONMENTS = REGISTERED_ENVS.keys()
 
 _BASES = ("MujocoEnv", "RobotEnv", "ManipulationEnv", "TwoArmEnv")
 OURS_ALONE: dict[str, type["MujocoEnv"]] = {}
@@ -48,8 +53,6 @@ def make(env_name: str, *args: Any, **kwargs: Any) -> Any:
         UnknownNameError: If benchmark, robot, controller or camera is unknown.
         ConfigError: If an argument is neither robosuite's nor ours.
     """
-    import wbc_suite.compat.robosuite.environments.manipulation  # noqa: F401 - registers
-
     known = OURS_ALONE | REGISTERED_ENVS
     if env_name not in known:
         raise UnknownNameError("environment", env_name, known)
@@ -212,9 +215,6 @@ class MujocoEnv(Observing):
         """Return the action without that of parts that are switched off."""
         return action
 
-    def _pre_action(self, action: Any, policy_step: bool = False) -> None:
-        """Do something before each control period; by default nothing."""
-
     def _post_action(self, action: Any) -> tuple[float, bool, dict[str, Any]]:
         """Return reward, whether the episode is over, and more for `info`."""
         reward = self.reward(action)
@@ -301,23 +301,17 @@ class MujocoEnv(Observing):
         """Delete the data of the episode."""
         self._ep_meta = {}
 
-    def visualize(self, vis_settings: Mapping[str, bool]) -> None:
-        """Do nothing: scenes have no visual marks; see `Indicators`."""
+    visualize = does_nothing("scenes have no visual marks; see `Indicators`")
+    update_state = does_nothing("values are read when they are asked for")
+    initialize_renderer = does_nothing("renderers are made when they are needed")
+    _pre_action = does_nothing("a subclass may, before each control period")
 
     @property
     def _visualizations(self) -> set[str]:
         return {"env", "robots", "grippers"}
 
-    def update_state(self) -> None:
-        """Do nothing: values are read when they are asked for."""
-
-    def initialize_renderer(self) -> None:
-        """Do nothing: renderers are made when they are needed."""
-
-    def close_renderer(self) -> None:
-        """Free the renderers."""
-        self._close_core()
-
     def close(self) -> None:
-        """Close the environment."""
+        """Free renderers and pages."""
         self._close_core()
+
+    close_renderer = close

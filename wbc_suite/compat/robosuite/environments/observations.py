@@ -1,5 +1,6 @@
 """Observations of robots, of our benchmarks' objects and of cameras."""
 
+from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -7,12 +8,108 @@ import mujoco
 import numpy as np
 
 from wbc_suite.compat.robosuite import macros
+from wbc_suite.compat.robosuite.forwarding import does_nothing
 from wbc_suite.compat.robosuite.utils.mjcf_utils import IMAGE_CONVENTION_MAPPING
-from wbc_suite.compat.robosuite.utils.observables import Observable, sensor
+from wbc_suite.compat.robosuite.utils.observables import MODIFIERS, Observable, sensor
 from wbc_suite.compat.robosuite.utils.transform_utils import mat2quat
+from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.sensing.cameras import CameraRequest
 from wbc_suite.sensing.proprioception import proprioception
 from wbc_suite.sensing.reading import Reading, body_quat
+
+Observation = OrderedDict[str, Any]
+
+
+class Observing:
+    """Samples the observations of an environment and hands them out."""
+
+    env: Any
+    control_freq: float
+    model_timestep: float
+    _observables: dict[str, Observable]
+
+    def _reset_observables(self) -> None:
+        for observable in self._observables.values():
+            observable.reset()
+
+    def _update_observables(self, force: bool = False) -> None:
+        """Sample what is due after one physics step, or everything."""
+        self._obs_cache = {}
+        self.env.observables.forget_pictures()
+        for observable in self._observables.values():
+            observable.update(self.model_timestep, self._obs_cache, force)
+
+    def follows_physics(self) -> bool:
+        """Whether an observation is sampled otherwise than once in a control period."""
+        return not all(
+            observable.is_plain_at(self.control_freq)
+            for observable in self._observables.values()
+            if observable.is_enabled()
+        )
+
+    def _get_observations(self, force_update: bool = False) -> Observation:
+        """Return what is enabled and active, and each modality in one vector."""
+        if force_update or not self.follows_physics():
+            self._update_observables(force=True)
+        found: Observation = OrderedDict()
+        groups: dict[str, list[Any]] = {}
+        for name, observable in self._observables.items():
+            if observable.is_enabled() and observable.is_active():
+                found[name] = observable.obs
+                if not observable.modality.startswith("image"):
+                    parts = groups.setdefault(observable.modality, [])
+                    parts.append(np.ravel(observable.obs))
+        for modality, parts in groups.items():
+            found[f"{modality}-state"] = np.concatenate(parts)
+        return found
+
+    def observation_spec(self) -> Observation:
+        """Return an example of the observations."""
+        return self._get_observations(force_update=True)
+
+    def add_observable(self, observable: Observable) -> None:
+        """Add an observation with a new name.
+
+        Raises:
+            ConfigError: If the name is taken.
+        """
+        if observable.name in self._observables:
+            raise ConfigError(f"There is an observable '{observable.name}' already.")
+        self._observables[observable.name] = observable
+
+    def modify_observable(
+        self, observable_name: str, attribute: str, modifier: Any
+    ) -> None:
+        """Change an observation: its sensor, corrupter, filter, delayer, ...
+
+        Raises:
+            UnknownNameError: If there is no such observation, or no such attribute.
+        """
+        if observable_name not in self._observables:
+            known = self._observables
+            raise UnknownNameError("observable", observable_name, known)
+        if attribute not in MODIFIERS:
+            raise UnknownNameError("attribute", attribute, MODIFIERS)
+        getattr(self._observables[observable_name], f"set_{attribute}")(modifier)
+
+    def _chosen(self, test: Callable[[Observable], bool]) -> set[str]:
+        return {name for name, o in self._observables.items() if test(o)}
+
+    observation_names = property(
+        lambda self: {*self._observables}, doc="Names of all observations."
+    )
+    observation_modalities = property(
+        lambda self: {o.modality for o in self._observables.values()},
+        doc="Modalities of all observations.",
+    )
+    enabled_observables = property(
+        lambda self: self._chosen(Observable.is_enabled),
+        doc="Names of the observations that are sampled.",
+    )
+    active_observables = property(
+        lambda self: self._chosen(Observable.is_active),
+        doc="Names of the observations that are returned.",
+    )
 
 
 class PolledObservables:
@@ -34,11 +131,8 @@ class PolledObservables:
         """Sample what is due."""
         self._env._update_observables()
 
-    def start(self, rng: np.random.Generator) -> None:
-        """Do nothing: the environment starts its own."""
-
-    def update(self) -> None:
-        """Do nothing: the environment updates its own."""
+    start = does_nothing("the environment starts its own")
+    update = does_nothing("the environment updates its own")
 
     def forget_pictures(self) -> None:
         """Draw pictures again when they are asked for."""

@@ -1,7 +1,6 @@
 """Environments with robots, and those in which they manipulate."""
 
 from collections import OrderedDict
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,8 @@ from wbc_suite.compat.robosuite.conventions import (
 )
 from wbc_suite.compat.robosuite.environments.aliases import SceneNames
 from wbc_suite.compat.robosuite.environments.arguments import (
+    ARGUMENTS,
+    changed_task,
     controller_of,
     one_each,
     ours,
@@ -27,10 +28,7 @@ from wbc_suite.compat.robosuite.environments.observations import (
     picture_keys,
     robot_observables,
 )
-from wbc_suite.compat.robosuite.environments.task_numbers import (
-    ARGUMENTS,
-    changed_task,
-)
+from wbc_suite.compat.robosuite.forwarding import does_nothing
 from wbc_suite.compat.robosuite.models.tasks import TaskBenchmark
 from wbc_suite.compat.robosuite.robots import ROBOT_CLASS_MAPPING
 from wbc_suite.compat.robosuite.utils.binding_utils import MjSim
@@ -109,8 +107,7 @@ class RobotEnv(MujocoEnv):
             )
             self.robots.append(robot)
 
-    def _check_robot_configuration(self, robots: Sequence[str]) -> None:
-        """Check names and number of robots; by default our benchmark does."""
+    _check_robot_configuration = does_nothing("our benchmark checks names and number")
 
     def _make_core(self) -> Core:
         arguments = ours(self.arguments) | {
@@ -181,10 +178,8 @@ class RobotEnv(MujocoEnv):
             readings = core.benchmark.observables()
             found += object_observables(readings, core.simulation.data, rate)
         cameras = core.config.cameras
-        self.camera_names = [camera.name for camera in cameras]
-        self.camera_heights = [camera.height for camera in cameras]
-        self.camera_widths = [camera.width for camera in cameras]
-        self.camera_depths = [camera.depth for camera in cameras]
+        for field in ("name", "height", "width", "depth"):
+            setattr(self, f"camera_{field}s", [getattr(c, field) for c in cameras])
         self.num_cameras = len(cameras)
         self._picture_keys = picture_keys(cameras)
         if self._picture_keys:
@@ -288,14 +283,7 @@ class ManipulationEnv(RobotEnv):
         difference = place - grip
         return float(np.linalg.norm(difference)) if return_distance else difference
 
-    def _visualize_gripper_to_target(
-        self, gripper: Any, target: Any, target_type: str = "body"
-    ) -> None:
-        """Do nothing: scenes have no visual marks."""
-
-    @property
-    def _visualizations(self) -> set[str]:
-        return {"env", "robots", "grippers"}
+    _visualize_gripper_to_target = does_nothing("scenes have no visual marks")
 
     def _get_arm_prefixes(
         self, robot: Any, include_robot_name: bool = True

@@ -2,6 +2,7 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -9,7 +10,15 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from wbc_suite.compat.robosuite.utils.mjcf_utils import Element, parse_file
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.compat.robosuite.utils.mjcf_utils import (
+    Element,
+    add_prefix,
+    parse_file,
+)
+from wbc_suite.robot import RobotDescription
+from wbc_suite.scene.objects import Extent
+from wbc_suite.tomlfile import read_toml
 
 SECTIONS = (
     *("worldbody", "asset", "actuator", "sensor", "tendon", "equality", "contact"),
@@ -96,13 +105,34 @@ class MujocoXML:
 class MujocoModel:
     """What all models tell: names of their elements, in the scene, and their extent."""
 
-    name: str = ""
-    naming_prefix: str = ""
-    bottom_offset: Any = np.zeros(3)
-    top_offset: Any = np.zeros(3)
-    horizontal_radius: Any = 0.0
+    _name = ""
     theirs: Mapping[str, Mapping[str, str]] = MappingProxyType({})
     """robosuite's names of elements in a scene by kind and ours; none before that."""
+
+    name: Any = property(lambda self: self._name, doc="Name of the model.")
+    naming_prefix: Any = property(
+        lambda self: f"{self.name}_", doc="Text before the names of its elements."
+    )
+    sites: Any = property(lambda self: [], doc="Names of its sites.")
+    important_geoms: Any = property(lambda self: {}, doc="Names of geoms by role.")
+    important_sites: Any = property(lambda self: {}, doc="Names of sites by role.")
+    important_sensors: Any = property(lambda self: {}, doc="Names of sensors by role.")
+    bottom_offset: Any = property(
+        lambda self: np.array([0.0, 0.0, -self._extent().bottom]),
+        doc="Offset of its lowest point from its origin, m.",
+    )
+    top_offset: Any = property(
+        lambda self: np.array([0.0, 0.0, self._extent().top]),
+        doc="Offset of its highest point from its origin, m.",
+    )
+    horizontal_radius: Any = property(
+        lambda self: self._extent().radius,
+        doc="Radius of its upright bounding cylinder, m.",
+    )
+
+    def _extent(self) -> Extent:
+        """Return its upright bounding cylinder."""
+        return Extent(radius=0.0, bottom=0.0, top=0.0)
 
     def shown(self, kind: str, names: Iterable[str]) -> list[str]:
         """Return the names of elements as the scene shows them."""
@@ -130,28 +160,8 @@ class MujocoModel:
             alpha = abs(sim.model.site_rgba[site, 3])
             sim.model.site_rgba[site, 3] = alpha if visible else -alpha
 
-    @property
-    def sites(self) -> Any:
-        """Names of its sites."""
-        return []
 
-    @property
-    def important_geoms(self) -> dict[str, Any]:
-        """Names of geoms by role."""
-        return {}
-
-    @property
-    def important_sites(self) -> dict[str, str]:
-        """Names of sites by role."""
-        return {}
-
-    @property
-    def important_sensors(self) -> dict[str, str]:
-        """Names of sensors by role."""
-        return {}
-
-
-class MujocoXMLModel(MujocoXML, MujocoModel):  # pyright: ignore[reportIncompatibleVariableOverride] - the file names it
+class MujocoXMLModel(MujocoXML, MujocoModel):
     """A model of an MJCF file that has a name and a number in its scene."""
 
     def __init__(self, fname: str | Path, idn: Any = 0) -> None:
@@ -159,6 +169,49 @@ class MujocoXMLModel(MujocoXML, MujocoModel):  # pyright: ignore[reportIncompati
         self.idn = idn
 
 
+def shown_names(kind: str, own: str, doc: str) -> Any:
+    """Return a property: the names in the scene of what an attribute lists of ours."""
+    return property(lambda self: self.shown(kind, getattr(self, own)), doc=doc)
+
+
 def element_names(elements: Iterable[Element]) -> list[str]:
     """Return the names of elements that have one."""
     return [e.get("name", "") for e in elements if e.get("name")]
+
+
+class DescribedModel(MujocoXML, MujocoModel):
+    """A model whose MJCF is that of a user's file, or of a description.
+
+    `root`, `tree`, `worldbody`, `actuator`, ... exist when they are asked for; names in
+    them start with `naming_prefix`.
+    """
+
+    description: RobotDescription
+    own_file: str | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in (*SECTIONS, "root", "tree", "folder"):
+            raise AttributeError(f"{type(self).__name__} has no attribute '{name}'.")
+        self._write()
+        return self.__dict__[name]
+
+    def _write(self) -> None:
+        MujocoXML.__init__(self, self.own_file or self.description.to_mjcf())
+        self.tree = ET.ElementTree(self.root)
+        add_prefix(self.root, self.naming_prefix)
+
+
+@cache
+def choices_of(robot: str) -> dict[str, str]:
+    """Return the parts of a robot of the catalogue that may be chosen, by name."""
+    catalogue, found = Catalogue(), {}
+    if not catalogue.holds("robots", robot):
+        return found
+    path = catalogue.find("robots", robot, kind="robot")
+    for part in read_toml(path).get("part", ()):
+        folder, _, stem = str(part.get("component", "")).partition("/")
+        names = catalogue.names(f"robots/{folder}")
+        if "choice" in part and stem in names:
+            index = names.index(stem)
+            found[part["name"]] = catalogue.called(f"robots/{folder}")[index]
+    return found

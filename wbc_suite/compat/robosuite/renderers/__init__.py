@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from wbc_suite.compat.robosuite.forwarding import does_nothing
+
 RENDERERS = ("mjviewer", "mujoco")
 
 
@@ -27,23 +29,12 @@ class Viewer:
         self.sim = sim
         self.callbacks: list[Any] = []
 
-    def set_camera(
-        self,
-        camera_id: Any = None,
-        camera_name: Any = None,
-        width: int | None = None,
-        height: int | None = None,
-    ) -> None:
-        """Do nothing: the page shows the scene from where its user looks."""
+    set_camera = does_nothing("the page shows the scene from where its user looks")
+    render = reset = update = close = does_nothing("`env.render` draws")
 
     def add_keypress_callback(self, keypress_callback: Any) -> None:
         """Remember a function that takes keys."""
         self.callbacks.append(keypress_callback)
-
-    def render(self) -> None:
-        """Do nothing: `env.render` draws."""
-
-    reset = update = close = render
 
 
 OpenCVViewer = OpenCVRenderer = MjviewerRenderer = Viewer

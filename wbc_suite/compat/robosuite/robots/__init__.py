@@ -6,17 +6,7 @@ from typing import Any
 from wbc_suite.compat.robosuite.models.robots import REGISTERED_ROBOTS
 from wbc_suite.compat.robosuite.robots.robot import Robot, models_of
 
-__all__ = [
-    "ALL_ROBOTS",
-    "ROBOT_CLASS_MAPPING",
-    "FixedBaseRobot",
-    "LeggedRobot",
-    "MobileRobot",
-    "Robot",
-    "WheeledRobot",
-    "models_of",
-    "register_robot_class",
-]
+__all__ = ["ALL_ROBOTS", "ROBOT_CLASS_MAPPING", "models_of"]
 
 
 class FixedBaseRobot(Robot):

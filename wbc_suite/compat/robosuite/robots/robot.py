@@ -1,15 +1,16 @@
 """One robot of an environment: its model, its parts, its measured state."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
+import mujoco
 import numpy as np
-from numpy.typing import ArrayLike
 
 from wbc_suite.compat.robosuite.controllers.user_controllers import (
     CompositeController,
     view_of,
 )
+from wbc_suite.compat.robosuite.forwarding import does_nothing, forwarded
 from wbc_suite.compat.robosuite.models.grippers import (
     GRIPPER_MAPPING,
     GripperModel,
@@ -17,15 +18,23 @@ from wbc_suite.compat.robosuite.models.grippers import (
 )
 from wbc_suite.compat.robosuite.models.own_files import changed
 from wbc_suite.compat.robosuite.models.robots import create_robot
-from wbc_suite.compat.robosuite.robots.measured import Measured
+from wbc_suite.compat.robosuite.utils import ROBOSUITE_DEFAULT_LOGGER
 from wbc_suite.compat.robosuite.utils.binding_utils import MjSim
+from wbc_suite.compat.robosuite.utils.transform_utils import mat2quat
 from wbc_suite.control import RobotState
 from wbc_suite.control.robot_parts import parts_of
 from wbc_suite.sensing.hands import hands_of
-from wbc_suite.typing import Indices, Vector
+from wbc_suite.typing import Array, Indices, Vector
 
 
-class Robot(Measured):
+def _by_arm(source: str, part: Callable[[Array], Array]) -> Any:
+    """Return a property: a part of the value of each arm that another one has."""
+    return property(
+        lambda self: {arm: part(x) for arm, x in getattr(self, source).items()}
+    )
+
+
+class Robot:
     """A robot by the name of its model's class.
 
     Before the scene exists there are only its models; `bind` gives it its state.
@@ -67,12 +76,11 @@ class Robot(Measured):
 
     def _start_at(self, qpos: Any) -> None:
         """Write the joints' positions at the start into the description."""
-        model, prefix = self.robot_model, len(self.robot_model.naming_prefix)
-        names = [name[prefix:] for name in model.own_joints]
-        robot = model.description
-        ready = {**robot.keyframes["ready"], **dict(zip(names, qpos, strict=True))}
-        keyframes = {**robot.keyframes, "ready": ready}
-        model.description = changed(robot, keyframes=keyframes)
+        robot = self.robot_model.description
+        given = dict(zip(self._joints(), qpos, strict=True))
+        ready = {"ready": robot.keyframes["ready"] | given}
+        keyframes = {**robot.keyframes, **ready}
+        self.robot_model.description = changed(robot, keyframes=keyframes)
 
     def _adopt_grippers(self) -> None:
         robot, prefix = self.robot_model.description, self.robot_model.naming_prefix
@@ -99,31 +107,48 @@ class Robot(Measured):
         self.composite_controller.set_period(1.0 / self.control_freq)
         hands = {hand.name: hand for hand in hands_of(state)}
         self.eef_site_id = {arm: hands[arm].site for arm in self.arms}
-        q, v = state.joint_addresses(self._joints(grippers=False))
+        names = self._joints()
+        q, v = state.joint_addresses(names)
         self._ref_joint_pos_indexes: Indices = q
         self._ref_joint_vel_indexes: Indices = v
-        ids = [state.model.joint(state.prefix + n).id for n in self._joints(False)]
+        ids = [state.model.joint(state.prefix + n).id for n in names]
         self._ref_joint_indexes: Indices = np.array(ids)
-        self._ref_gripper_joint_pos_indexes = {
-            arm: [sim.model.get_joint_qpos_addr(j) for j in g.own_joints]
-            for arm, g in self.gripper.items()
-        }
-        self._ref_gripper_joint_vel_indexes = {
-            arm: [sim.model.get_joint_qvel_addr(j) for j in g.own_joints]
-            for arm, g in self.gripper.items()
-        }
+        self._ref_gripper_joint_pos_indexes, self._ref_gripper_joint_vel_indexes = (
+            {arm: [find(j) for j in g.own_joints] for arm, g in self.gripper.items()}
+            for find in (sim.model.get_joint_qpos_addr, sim.model.get_joint_qvel_addr)
+        )
 
-    def _joints(self, grippers: bool) -> tuple[str, ...]:
+    def _joints(self) -> tuple[str, ...]:
+        """Return our names of its joints, without the robot's number."""
         robot, prefix = self.robot_model, len(self.robot_model.naming_prefix)
-        names = [*robot.own_joints]
-        if grippers:
-            names += [j for g in self.gripper.values() for j in g.own_joints]
-        return tuple(name[prefix:] for name in names)
+        return tuple(name[prefix:] for name in robot.own_joints)
 
     def __getattr__(self, name: str) -> Any:
         if name in ("robot_model", "_state") or name.startswith("__"):
             raise AttributeError(name)
         return getattr(self.robot_model.description, name)
+
+    dof = forwarded("robot_model", "dof", "Number of its joints, without grippers.")
+    robot_joints = forwarded(
+        "robot_model", "joints", "Names of its joints, without grippers."
+    )
+    part_controllers = forwarded(
+        "composite_controller", "part_controllers", "Controllers of its parts, by name."
+    )
+    action_limits = forwarded(
+        "composite_controller", "action_limits", "Least and greatest actions."
+    )
+    _action_split_indexes = forwarded(
+        "composite_controller", "_action_split_indexes", "Begin and end of each part."
+    )
+    create_action_vector = forwarded(
+        "composite_controller",
+        "create_action_vector",
+        "An action from values of parts, and zeros for the others.",
+    )
+    load_model = does_nothing("its models are loaded when it is made")
+    reset = does_nothing("the environment resets its robots")
+    visualize = does_nothing("robots have no visual marks")
 
     # What the robot is made of.
 
@@ -131,11 +156,6 @@ class Robot(Measured):
     def is_mobile(self) -> bool:
         """Whether its base moves."""
         return self.robot_model.description.root.kind != "fixed"
-
-    @property
-    def dof(self) -> int:
-        """Number of its joints, without grippers."""
-        return self.robot_model.dof
 
     @property
     def has_gripper(self) -> dict[str, bool]:
@@ -146,11 +166,6 @@ class Robot(Measured):
     def gripper_joints(self) -> dict[str, list[str]]:
         """Names of the gripper's joints, by arm."""
         return {arm: gripper.joints for arm, gripper in self.gripper.items()}
-
-    @property
-    def robot_joints(self) -> list[str]:
-        """Names of its joints, without grippers."""
-        return self.robot_model.joints
 
     @property
     def joint_indexes(self) -> list[int]:
@@ -168,11 +183,6 @@ class Robot(Measured):
             found[part] = own if part == arm else own.get("gripper", {})
         return found
 
-    @property
-    def part_controllers(self) -> dict[str, Any]:
-        """Controllers of its parts, by name."""
-        return self.composite_controller.part_controllers
-
     def has_part(self, part_name: str) -> bool:
         """Whether it has a part, such as `torso`."""
         return part_name in parts_of(self.robot_model.description)
@@ -185,8 +195,95 @@ class Robot(Measured):
         """Whether a part is driven."""
         return part_name in self.part_controllers and part_name not in self.disabled
 
-    def load_model(self) -> None:
-        """Do nothing: its models are loaded when it is made."""
+    # Measured state; values by arm are dictionaries.
+
+    @property
+    def _joint_positions(self) -> Vector:
+        return self.sim.data._data.qpos[self._ref_joint_pos_indexes]
+
+    @property
+    def _joint_velocities(self) -> Vector:
+        return self.sim.data._data.qvel[self._ref_joint_vel_indexes]
+
+    @property
+    def torques(self) -> Vector:
+        """Torques that its actuators exert, N m."""
+        return self.sim.data._data.qfrc_actuator[self._ref_joint_vel_indexes].copy()
+
+    @property
+    def js_energy(self) -> Vector:
+        """Absolute torques of its actuators times a control period."""
+        force = self.sim.data._data.qfrc_actuator[self._ref_joint_vel_indexes]
+        return np.abs(force) / self.control_freq
+
+    @property
+    def _hand_pose(self) -> dict[str, Array]:
+        """Pose of the last body of each arm in the base's frame, shape (4, 4)."""
+        names = self.robot_model.eef_name
+        return {arm: self.pose_in_base_from_name(n) for arm, n in names.items()}
+
+    _hand_pos = _by_arm("_hand_pose", lambda pose: pose[:3, 3])
+    _hand_orn = _by_arm("_hand_pose", lambda pose: pose[:3, :3])
+    _hand_quat = _by_arm("_hand_pose", mat2quat)
+    _hand_vel = _by_arm("_hand_total_velocity", lambda twist: twist[:3])
+    _hand_ang_vel = _by_arm("_hand_total_velocity", lambda twist: twist[3:])
+
+    @property
+    def _hand_total_velocity(self) -> dict[str, Vector]:
+        """Linear and angular velocity of that body, in the base's axes, shape (6,)."""
+        model, data, R = self._state.model, self.sim.data._data, self.base_ori
+        found: dict[str, Vector] = {}
+        for arm, name in self.robot_model.eef_name.items():
+            twist = np.zeros(6)
+            body = self.sim.model.index("body", name)
+            kind = mujoco.mjtObj.mjOBJ_BODY
+            mujoco.mj_objectVelocity(model, data, kind, body, twist, 0)
+            found[arm] = np.concatenate([R.T @ twist[3:], R.T @ twist[:3]])
+        return found
+
+    ee_force = property(lambda self: self._wrench("force_ee"), doc="At each wrist, N.")
+    ee_torque = property(
+        lambda self: self._wrench("torque_ee"), doc="At each wrist, N m."
+    )
+
+    def _wrench(self, kind: str) -> dict[str, Vector]:
+        return {
+            arm: self.get_sensor_measurement(gripper.important_sensors[kind])
+            for arm, gripper in self.gripper.items()
+        }
+
+    def get_sensor_measurement(self, sensor_name: str) -> Vector:
+        """Return the values of a sensor."""
+        model = self.sim.model
+        sensor = model.index("sensor", sensor_name)
+        first = model.sensor_adr[sensor]
+        data = self.sim.data._data.sensordata
+        return data[first : first + model.sensor_dim[sensor]].copy()
+
+    @property
+    def base_pos(self) -> Vector:
+        """Position of its base in the world, m."""
+        return self.sim.data.get_body_xpos(self.robot_model.root_body)
+
+    @property
+    def base_ori(self) -> Array:
+        """Orientation of its base in the world, shape (3, 3)."""
+        return self.sim.data.get_body_xmat(self.robot_model.root_body)
+
+    def pose_in_base_from_name(self, name: str) -> Array:
+        """Return the pose of a body in the base's frame, shape (4, 4)."""
+        data, pose = self.sim.data, np.eye(4)
+        R = self.base_ori
+        pose[:3, :3] = R.T @ data.get_body_xmat(name)
+        pose[:3, 3] = R.T @ (data.get_body_xpos(name) - self.base_pos)
+        return pose
+
+    def check_q_limits(self) -> bool:
+        """Whether a joint is within 0.1 rad of the end of its range."""
+        ranges = self._state.model.jnt_range[self._ref_joint_indexes]
+        limited = self._state.model.jnt_limited[self._ref_joint_indexes].astype(bool)
+        q, (low, high) = self._joint_positions, ranges.T
+        return bool((limited & ((q < low + 0.1) | (q > high - 0.1))).any())
 
     # Actions.
 
@@ -194,19 +291,6 @@ class Robot(Measured):
     def action_dim(self) -> int:
         """Number of its action values."""
         return self.composite_controller.layout.size
-
-    @property
-    def action_limits(self) -> tuple[Vector, Vector]:
-        """Least and greatest values of its part of an action."""
-        return self.composite_controller.action_limits
-
-    @property
-    def _action_split_indexes(self) -> dict[str, tuple[int, int]]:
-        return self.composite_controller._action_split_indexes
-
-    def create_action_vector(self, action_dict: Mapping[str, ArrayLike]) -> Vector:
-        """Return an action from values of parts, and zeros for the others."""
-        return self.composite_controller.create_action_vector(action_dict)
 
     def print_action_info(self) -> None:
         """Log the splits of the action."""
@@ -249,12 +333,6 @@ class Robot(Measured):
         arm = self.arms[0] if gripper_arm is None else gripper_arm
         return self.sim.data._data.qpos[self._ref_gripper_joint_pos_indexes[arm]]
 
-    def reset(self, deterministic: bool = False, rng: Any = None) -> None:
-        """Do nothing: the environment resets its robots."""
-
-    def visualize(self, vis_settings: Mapping[str, bool]) -> None:
-        """Do nothing: robots have no visual marks."""
-
 
 def _mounted(
     cls: type[GripperModel], robot: Any, prefix: str, arm: str, idn: str
@@ -280,7 +358,5 @@ def models_of(state: RobotState) -> tuple[MjSim, Any, dict[str, GripperModel]]:
 
 
 def _log(table: Mapping[str, Any]) -> None:
-    from wbc_suite.compat.robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER
-
     for name, value in table.items():
         ROBOSUITE_DEFAULT_LOGGER.info("%s: %s", name, value)

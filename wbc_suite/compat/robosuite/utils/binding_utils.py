@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.arguments import check_array
+from wbc_suite.compat.robosuite.forwarding import does_nothing
 from wbc_suite.envs.states import motion_size, write_physics
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.files import check_file
@@ -19,6 +21,7 @@ KINDS = "body|joint|geom|site|light|camera|actuator|sensor|tendon|mesh"
 _OF_MODEL = re.compile(rf"_?({KINDS})_(name2id|id2name|names)")
 _COUNTS = {"joint": "jnt", "camera": "cam", "actuator": "u"}
 _OF_DATA = re.compile(r"get_(body|geom|site|camera|joint|light)_(\w+)")
+_OF_MOCAP = re.compile(r"(get|set)_(mocap_pos|mocap_quat)")
 _ARRAYS = {"body_xpos": "xpos", "body_xquat": "xquat", "body_xmat": "xmat"}
 _KIND = {"body": "BODY", "geom": "GEOM", "site": "SITE"}
 
@@ -112,13 +115,19 @@ class MjModel:
 
 
 class MjData:
-    """MuJoCo's data (`_data`), and values of elements by name: `get_site_xpos`, ..."""
+    """MuJoCo's data (`_data`), and values of elements by name.
+
+    `get_site_xpos(name)`, `get_body_xvelp(name)`, `set_mocap_pos(name, value)` and the
+    like exist for all kinds.
+    """
 
     def __init__(self, model: MjModel, data: mujoco.MjData) -> None:
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "_data", data)
 
     def __getattr__(self, name: str) -> Any:
+        if found := _OF_MOCAP.fullmatch(name):
+            return partial(self._mocap, *found.groups())
         if name in _ARRAYS:
             return getattr(self._data, _ARRAYS[name])
         found = _OF_DATA.fullmatch(name)
@@ -147,24 +156,13 @@ class MjData:
         """Write a joint's velocity."""
         self._view("joint", name, "qvel")[:] = value
 
-    def get_mocap_pos(self, name: str) -> Vector:
-        """Return the position of a mocap body, m. A view."""
-        return self._data.mocap_pos[self._mocap(name)]
-
-    def set_mocap_pos(self, name: str, value: Any) -> None:
-        """Write the position of a mocap body."""
-        self._data.mocap_pos[self._mocap(name)] = value
-
-    def get_mocap_quat(self, name: str) -> Vector:
-        """Return the orientation of a mocap body, w x y z. A view."""
-        return self._data.mocap_quat[self._mocap(name)]
-
-    def set_mocap_quat(self, name: str, value: Any) -> None:
-        """Write the orientation of a mocap body."""
-        self._data.mocap_quat[self._mocap(name)] = value
-
-    def _mocap(self, name: str) -> int:
-        return int(self.model.body_mocapid[self.model.index("body", name)])
+    def _mocap(self, verb: str, column: str, name: str, *value: Any) -> Any:
+        """Write, or return a view of, a mocap body's pose, m or w x y z."""
+        body = self.model.index("body", name)
+        row = getattr(self._data, column)[int(self.model.body_mocapid[body])]
+        if verb == "get":
+            return row
+        row[:] = value[0]
 
     def _value(self, kind: str, name: str, column: str) -> Any:
         found = self._view(kind, name, column)
@@ -359,11 +357,8 @@ class MjSim:
         scaled = np.maximum(distance / model.stat.extent, near)
         return (1.0 - near / scaled) / (1.0 - near / far)
 
-    def add_render_context(self, render_context: Any) -> None:
-        """Do nothing: renderers are made when pictures are asked for."""
-
-    def free(self) -> None:
-        """Do nothing: memory is freed when nothing refers to it."""
+    add_render_context = does_nothing("renderers are made when pictures are asked for")
+    free = does_nothing("memory is freed when nothing refers to it")
 
 
 class MjRenderContextOffscreen:

@@ -22,52 +22,50 @@ def sensor(modality: str) -> Callable[[Sensor], Sensor]:
     return mark
 
 
+Corrupter = Callable[[Any], Any]
+Delayer = Callable[[], float]
+
+
 def create_deterministic_corrupter(
     corruption: Any, low: Any = -np.inf, high: Any = np.inf
-) -> Callable[[Any], Any]:
+) -> Corrupter:
     """Return a function that adds the same values and clips."""
     return lambda values: np.clip(np.asarray(values) + corruption, low, high)
 
 
 def create_uniform_noise_corrupter(
     min_noise: Any, max_noise: Any, low: Any = -np.inf, high: Any = np.inf
-) -> Callable[[Any], Any]:
+) -> Corrupter:
     """Return a function that adds uniform noise and clips."""
-
-    def corrupt(values: Any) -> Any:
-        values = np.asarray(values)
-        noise = np.random.uniform(min_noise, max_noise, values.shape)  # noqa: NPY002 - robosuite's users seed NumPy's global generator
-        return np.clip(values + noise, low, high)
-
-    return corrupt
+    return _noisy(np.random.uniform, min_noise, max_noise, low, high)
 
 
 def create_gaussian_noise_corrupter(
     mean: Any, std: Any, low: Any = -np.inf, high: Any = np.inf
-) -> Callable[[Any], Any]:
+) -> Corrupter:
     """Return a function that adds Gaussian noise and clips."""
+    return _noisy(np.random.normal, mean, std, low, high)
 
+
+def _noisy(draw: Any, a: Any, b: Any, low: Any, high: Any) -> Corrupter:
     def corrupt(values: Any) -> Any:
         values = np.asarray(values)
-        noise = np.random.normal(mean, std, values.shape)  # noqa: NPY002 - as above
-        return np.clip(values + noise, low, high)
+        return np.clip(values + draw(a, b, values.shape), low, high)
 
     return corrupt
 
 
-def create_deterministic_delayer(delay: float) -> Callable[[], float]:
+def create_deterministic_delayer(delay: float) -> Delayer:
     """Return a function that returns the same delay, s."""
     return lambda: delay
 
 
-def create_uniform_sampled_delayer(
-    min_delay: float, max_delay: float
-) -> Callable[[], float]:
+def create_uniform_sampled_delayer(min_delay: float, max_delay: float) -> Delayer:
     """Return a function that draws delays uniformly, s."""
     return lambda: float(np.random.uniform(min_delay, max_delay))  # noqa: NPY002 - as above
 
 
-def create_gaussian_sampled_delayer(mean: float, std: float) -> Callable[[], float]:
+def create_gaussian_sampled_delayer(mean: float, std: float) -> Delayer:
     """Return a function that draws Gaussian delays, s, at least 0."""
     return lambda: max(float(np.random.normal(mean, std)), 0.0)  # noqa: NPY002 - as above
 
@@ -77,14 +75,7 @@ def NO_CORRUPTION(inp: Any) -> Any:
     return inp
 
 
-def NO_FILTER(inp: Any) -> Any:
-    """Return values unchanged."""
-    return inp
-
-
-def NO_DELAY() -> float:
-    """Return no delay."""
-    return 0.0
+NO_FILTER, NO_DELAY = NO_CORRUPTION, create_deterministic_delayer(0.0)
 
 
 class Observable:

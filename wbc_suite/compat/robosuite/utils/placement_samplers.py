@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc_suite.compat.robosuite.models.objects.scene import TaskObject
+from wbc_suite.compat.robosuite.models.objects.bodies import TaskObject
 from wbc_suite.compat.robosuite.utils.transform_utils import quat_multiply
 from wbc_suite.errors import ConfigError, PlacementError
 from wbc_suite.scene.placement import Objects, Placed, Placements, Taken
@@ -102,7 +102,7 @@ class UniformRandomSampler(ObjectPositionSampler):
     """Draws poses uniformly in a rectangle.
 
     `rotation` is an angle about `rotation_axis`, rad, a range of angles, or None for
-    any.
+    any. Further arguments are those of `ObjectPositionSampler`.
     """
 
     def __init__(
@@ -113,25 +113,14 @@ class UniformRandomSampler(ObjectPositionSampler):
         y_range: Any = (0, 0),
         rotation: Any = None,
         rotation_axis: str = "z",
-        ensure_object_boundary_in_range: bool = True,
-        ensure_valid_placement: bool = True,
-        reference_pos: Any = (0, 0, 0),
-        z_offset: float = 0.0,
-        rng: np.random.Generator | None = None,
+        *shared: Any,
+        **named: Any,
     ) -> None:
         if rotation_axis not in ("x", "y", "z"):
             raise ConfigError("rotation_axis is 'x', 'y' or 'z'.")
         self.x_range, self.y_range = x_range, y_range
         self.rotation, self.rotation_axis = rotation, rotation_axis
-        super().__init__(
-            name,
-            mujoco_objects,
-            ensure_object_boundary_in_range,
-            ensure_valid_placement,
-            reference_pos,
-            z_offset,
-            rng,
-        )
+        super().__init__(name, mujoco_objects, *shared, **named)
 
     def _within(self, limits: Any, radius: float) -> float:
         low, high = limits
@@ -178,10 +167,9 @@ class UniformRandomSampler(ObjectPositionSampler):
         return placed
 
     def _base(self, reference: Any, placed: Mapping[str, Any], on_top: bool) -> Any:
-        if reference is None:
-            return np.asarray(self.reference_pos, np.float64)
         if not isinstance(reference, str):
-            return np.asarray(reference, np.float64)
+            given = self.reference_pos if reference is None else reference
+            return np.asarray(given, np.float64)
         if reference not in placed:
             raise ConfigError(f"{self.name}: '{reference}' is not placed yet.")
         position, _, item = placed[reference]
@@ -234,18 +222,18 @@ class SequentialCompositeSampler(ObjectPositionSampler):
 
     def hide(self, mujoco_objects: Any) -> None:
         """Place objects far away."""
-        name = f"hide{len(self.samplers)}"
-        far = UniformRandomSampler(
-            name,
-            mujoco_objects,
-            x_range=(-10, -20),
-            y_range=(-10, -20),
-            rotation=(0, 0),
-            ensure_object_boundary_in_range=False,
-            ensure_valid_placement=False,
-            z_offset=10,
+        far = dict.fromkeys(("x_range", "y_range"), (-10, -20))
+        self.append_sampler(
+            UniformRandomSampler(
+                f"hide{len(self.samplers)}",
+                mujoco_objects,
+                **far,
+                rotation=(0, 0),
+                ensure_object_boundary_in_range=False,
+                ensure_valid_placement=False,
+                z_offset=10,
+            )
         )
-        self.append_sampler(far)
 
     def add_objects(self, mujoco_objects: Any) -> None:
         """Raise ConfigError: objects belong to the samplers."""

@@ -222,9 +222,7 @@ def get_pose_error(target_pose: Any, current_pose: Any) -> Vector:
     return np.concatenate([target_pose[:3, 3] - current_pose[:3, 3], turn])
 
 
-def matrix_inverse(matrix: Any) -> Array:
-    """Return the inverse of a matrix."""
-    return np.linalg.inv(matrix)
+matrix_inverse = np.linalg.inv
 
 
 def rotate_2d_point(input: Any, rot: float) -> Vector:

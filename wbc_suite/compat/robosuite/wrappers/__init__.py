@@ -1,19 +1,11 @@
 """Wrappers of environments."""
 
-from wbc_suite.compat.robosuite.wrappers.collecting import DataCollectionWrapper
-from wbc_suite.compat.robosuite.wrappers.gym import GymWrapper
-from wbc_suite.compat.robosuite.wrappers.plain import (
-    DemoSamplerWrapper,
-    DomainRandomizationWrapper,
-    VisualizationWrapper,
-    Wrapper,
-)
+from typing import Any
 
-__all__ = [
-    "DataCollectionWrapper",
-    "DemoSamplerWrapper",
-    "DomainRandomizationWrapper",
-    "GymWrapper",
-    "VisualizationWrapper",
-    "Wrapper",
-]
+from wbc_suite.compat.robosuite.forwarding import names_of
+
+_find, __dir__ = names_of(__name__, "collecting", "gym", "plain")
+
+
+def __getattr__(name: str) -> Any:
+    return _find(name)

@@ -49,21 +49,6 @@ class Wrapper:
         """Return an example of the observations."""
         return self.env.observation_spec()
 
-    @property
-    def action_spec(self) -> Any:
-        """Least and greatest actions."""
-        return self.env.action_spec
-
-    @property
-    def action_dim(self) -> int:
-        """Number of action values."""
-        return self.env.action_dim
-
-    @property
-    def unwrapped(self) -> Any:
-        """The environment without wrappers."""
-        return self.env.unwrapped
-
     def __getattr__(self, attr: str) -> Any:
         if attr == "env" or attr.startswith("__"):
             raise AttributeError(attr)

@@ -1,18 +1,45 @@
 """The tasks of the catalogue under robosuite's class names, and their bases."""
 
-from collections.abc import Sequence
+from functools import partialmethod
 from typing import Any
 
 import numpy as np
 
 from wbc_suite.benchmark import BENCHMARKS
 from wbc_suite.benchmark.wipe import MARK
-from wbc_suite.compat.robosuite.environments.robot_env import ManipulationEnv, RobotEnv
-from wbc_suite.compat.robosuite.environments.task_numbers import DEFAULT_WIPE_CONFIG
-from wbc_suite.compat.robosuite.environments.two_arm_env import TwoArmEnv
-from wbc_suite.compat.robosuite.models.objects.scene import TaskObject
+from wbc_suite.compat.robosuite.environments.arguments import DEFAULT_WIPE_CONFIG
+from wbc_suite.compat.robosuite.environments.robot_env import ManipulationEnv
+from wbc_suite.compat.robosuite.environments.robot_env import RobotEnv as RobotEnv
+from wbc_suite.compat.robosuite.models.objects.bodies import TaskObject
+from wbc_suite.compat.robosuite.utils.transform_utils import mat2quat
 
-__all__ = ["DEFAULT_WIPE_CONFIG", "ManipulationEnv", "RobotEnv", "TwoArmEnv"]
+
+class TwoArmEnv(ManipulationEnv):
+    """An environment for one robot with two arms, or two with one each."""
+
+    def _arm(self, k: int) -> tuple[Any, str]:
+        """Return robot and arm of the k-th hand."""
+        if len(self.robots) > 1:
+            return self.robots[k], self.robots[k].arms[0]
+        return self.robots[0], self.robots[0].arms[k]
+
+    def _gripper_to(self, k: int, target: Any, kind: str = "body", **kw: Any) -> Any:
+        robot, arm = self._arm(k)
+        return self._gripper_to_target(robot.gripper[arm], target, kind, **kw)
+
+    _gripper0_to_target = partialmethod(_gripper_to, 0)
+    _gripper1_to_target = partialmethod(_gripper_to, 1)
+
+    def _hand(self, k: int, field: str) -> Any:
+        robot, arm = self._arm(k)
+        return getattr(self.sim.data, field)[robot.eef_site_id[arm]].copy()
+
+    _eef0_xpos = property(lambda self: self._hand(0, "site_xpos"))
+    _eef1_xpos = property(lambda self: self._hand(1, "site_xpos"))
+    _eef0_xmat = property(lambda self: self._hand(0, "site_xmat").reshape(3, 3))
+    _eef1_xmat = property(lambda self: self._hand(1, "site_xmat").reshape(3, 3))
+    _eef0_xquat = property(lambda self: mat2quat(self._eef0_xmat))
+    _eef1_xquat = property(lambda self: mat2quat(self._eef1_xmat))
 
 
 def _setup_references(self: Any) -> None:
@@ -45,7 +72,7 @@ def _draw_height(self: Any) -> None:
     task.wipe(np.zeros(len(task.marks), dtype=np.bool_))
 
 
-def _make(name: str, bases: Sequence[type]) -> type:
+def _make(name: str, base: type) -> type:
     body = {
         "benchmark": name,
         "_setup_references": _setup_references,
@@ -54,9 +81,9 @@ def _make(name: str, bases: Sequence[type]) -> type:
     }
     if name == "Wipe":
         body["_reset_internal"] = _draw_height
-    return type(name, tuple(bases), body)
+    return type(name, (base,), body)
 
 
 for _name in BENCHMARKS:
     _base = TwoArmEnv if _name.startswith("TwoArm") else ManipulationEnv
-    globals()[_name] = _make(_name, [_base])
+    globals()[_name] = _make(_name, _base)

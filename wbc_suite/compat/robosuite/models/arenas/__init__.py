@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.benchmark import ObjectBenchmark, load_benchmark
-from wbc_suite.compat.robosuite.environments.task_numbers import changed_task
+from wbc_suite.compat.robosuite.environments.arguments import changed_task
 from wbc_suite.compat.robosuite.models.base import MujocoXML
 from wbc_suite.compat.robosuite.utils.mjcf_utils import (
     array_to_string,

@@ -5,8 +5,6 @@ from typing import Any
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite.models.base import MujocoModel
 
-__all__ = ["ALL_BASES", "BASE_MAPPING", "RobotBaseModel", "register_base"]
-
 
 class RobotBaseModel(MujocoModel):
     """A base by its name in the catalogue; names in the scene start as its robot's."""
@@ -14,15 +12,10 @@ class RobotBaseModel(MujocoModel):
     def __init__(self, idn: int = 0) -> None:
         self.idn = idn
 
-    @property
-    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its class's
-        """Name of its class."""
-        return type(self).__name__
-
-    @property
-    def naming_prefix(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its number's
-        """Text before the names of its elements."""
-        return f"robot{self.idn}_"
+    name: Any = property(lambda self: type(self).__name__, doc="Name of its class.")
+    naming_prefix: Any = property(
+        lambda self: f"robot{self.idn}_", doc="Text before the names of its elements."
+    )
 
 
 MountModel = MobileBaseModel = LegBaseModel = NullBaseModel = RobotBaseModel

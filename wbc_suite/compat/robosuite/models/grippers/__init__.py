@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.compat.robosuite.models.described import DescribedModel
+from wbc_suite.compat.robosuite.models.base import DescribedModel, shown_names
 from wbc_suite.compat.robosuite.models.grippers.fingers import (
     finger_sides,
     moved_links,
@@ -68,33 +68,34 @@ class GripperModel(DescribedModel):
         alone = () if robot is not None else tuple(own.values())
         self._synergies = own.get(f"{arm}_gripper", sum(alone, ()))
         self.current_action = np.zeros(self.dof)
-        frame = next(iter(self.description.hands.values()), "")
-        if robot is not None:
-            frame = robot.hands[arm]
-        self._frame, self._arm = frame, arm
-        own = self.description
-        every = [link.name for link in own.links]
-        self._links = every if robot is None else gripper_links(own, arm, frame)
+        self._arm = arm
+        if robot is None:
+            self._frame = next(iter(self.description.hands.values()), "")
+            self._links = [link.name for link in self.description.links]
+        else:
+            self._frame = robot.hands[arm]
+            self._links = gripper_links(robot, arm, self._frame)
 
-    @property
-    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its class's
-        """Name of its class."""
-        return type(self).__name__
-
-    @property
-    def naming_prefix(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its arm's
-        """Text before the names of robosuite's elements, which are understood too."""
-        return f"gripper{self.idn}_"
+    name: Any = property(lambda self: type(self).__name__, doc="Name of its class.")
+    naming_prefix: Any = property(
+        lambda self: f"gripper{self.idn}_",
+        doc="Text before the names of robosuite's elements, which are understood too.",
+    )
+    dof: Any = property(
+        lambda self: len(self._synergies), doc="Number of its action values."
+    )
+    joints = shown_names("joint", "own_joints", "Names of its joints in the scene.")
+    actuators = shown_names(
+        "actuator", "own_actuators", "Names of its actuators in the scene."
+    )
+    contact_geoms = shown_names(
+        "geom", "own_contact_geoms", "Names of its geoms that collide."
+    )
 
     @property
     def speed(self) -> float:
         """Change of the grasp at a full action in a control period."""
         return SPEEDS.get(self.name, 0.2)
-
-    @property
-    def dof(self) -> int:
-        """Number of its action values."""
-        return len(self._synergies)
 
     def format_action(self, action: Any) -> Vector:
         """Return the position of each actuator in its range, -1 to 1.
@@ -112,8 +113,7 @@ class GripperModel(DescribedModel):
 
     def _driven(self) -> tuple[str, ...]:
         groups = self.description.groups
-        own = groups.get(f"{self._arm}_gripper", groups.get("gripper", ()))
-        return tuple(own)
+        return groups.get(f"{self._arm}_gripper", groups.get("gripper", ()))
 
     def _write(self) -> None:
         super()._write()
@@ -135,11 +135,6 @@ class GripperModel(DescribedModel):
         links = map(self.description.link, self._moved())
         return [self.prefix + link.joint.name for link in links if link.joint]
 
-    @property
-    def joints(self) -> list[str]:
-        """Names of its joints in the scene."""
-        return self.shown("joint", self.own_joints)
-
     def _moved(self) -> list[str]:
         groups = self.description.groups.items()
         alone = self.prefix == self.naming_prefix
@@ -152,19 +147,9 @@ class GripperModel(DescribedModel):
         return [self.prefix + name for name in self._driven()]
 
     @property
-    def actuators(self) -> list[str]:
-        """Names of its actuators in the scene."""
-        return self.shown("actuator", self.own_actuators)
-
-    @property
     def sites(self) -> list[str]:
         """Names of its sites."""
         return [self.prefix + self._frame] if self._frame else []
-
-    @property
-    def contact_geoms(self) -> list[str]:
-        """Names of its geoms that collide."""
-        return self.shown("geom", self.own_contact_geoms)
 
     @property
     def own_contact_geoms(self) -> list[str]:
@@ -235,11 +220,10 @@ class GripperModel(DescribedModel):
     @property
     def init_qpos(self) -> Vector:
         """Positions of its joints at the start."""
-        ready = self.description.keyframes.get("ready") and self.description.keyframe(
-            "ready"
-        )
+        robot = self.description
+        ready = robot.keyframe("ready") if robot.keyframes.get("ready") else {}
         names = [name.removeprefix(self.prefix) for name in self.own_joints]
-        return np.array([ready[n] if ready else 0.0 for n in names])
+        return np.array([ready.get(name, 0.0) for name in names])
 
 
 def _with_own_motors(robot: RobotDescription) -> RobotDescription:
@@ -288,10 +272,7 @@ def _make(name: str) -> type[GripperModel]:
 class NullGripper(GripperModel):
     """No gripper."""
 
-    @property
-    def dof(self) -> int:
-        """0."""
-        return 0
+    dof: Any = 0
 
     def __init__(self, idn: Any = 0, **kwargs: Any) -> None:
         kwargs.setdefault("robot", load_robot("Panda", gripper="none"))

@@ -1,36 +1,11 @@
 """Objects, of shapes or of MJCF files."""
 
-from wbc_suite.compat.robosuite.models.objects.bodies import (
-    MujocoGeneratedObject,
-    MujocoObject,
-    MujocoXMLObject,
-)
-from wbc_suite.compat.robosuite.models.objects.composites import (
-    CompositeBodyObject,
-    CompositeObject,
-    ObjectGroup,
-)
-from wbc_suite.compat.robosuite.models.objects.ready_made import READY_MADE
-from wbc_suite.compat.robosuite.models.objects.shapes import (
-    BallObject,
-    BoxObject,
-    CapsuleObject,
-    CylinderObject,
-    PrimitiveObject,
-)
+from typing import Any
 
-__all__ = [
-    "BallObject",
-    "BoxObject",
-    "CapsuleObject",
-    "CompositeBodyObject",
-    "CompositeObject",
-    "CylinderObject",
-    "MujocoGeneratedObject",
-    "MujocoObject",
-    "MujocoXMLObject",
-    "ObjectGroup",
-    "PrimitiveObject",
-]
+from wbc_suite.compat.robosuite.forwarding import names_of
 
-globals().update(READY_MADE)
+_find, __dir__ = names_of(__name__, "bodies", "shapes", "composites", "ready_made")
+
+
+def __getattr__(name: str) -> Any:
+    return _find(name)

@@ -2,6 +2,7 @@
 
 import copy
 import xml.etree.ElementTree as ET
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,27 @@ from wbc_suite.compat.robosuite.utils.mjcf_utils import (
     string_to_array,
 )
 from wbc_suite.errors import ConfigError
+from wbc_suite.scene.objects import Extent, ObjectState
 from wbc_suite.typing import Vector
 
 FREE = {"type": "free", "damping": "0.0005"}
+
+
+def joints_of(given: Any) -> list[dict[str, Any]]:
+    """Return the attributes of joints: "default" is a free one, None is none."""
+    return [dict(FREE)] if isinstance(given, str) else [dict(j) for j in given or ()]
+
+
+def _names(doc: str, *tags: str, solid: bool | None = None) -> Any:
+    """Return a property: names of elements, perhaps of solid or visual geoms only."""
+
+    def names(self: "MujocoObject") -> list[str]:
+        every = (element for tag in tags for element in self._obj.iter(tag))
+        return element_names(
+            e for e in every if solid in (None, e.get("contype", "1") != "0")
+        )
+
+    return property(names, doc=doc)
 
 
 class MujocoObject(MujocoModel):
@@ -35,7 +54,6 @@ class MujocoObject(MujocoModel):
     Geoms of group 1 are visual; where there are none, collision geoms are drawn.
     """
 
-    _name: str
     joint_specs: list[dict[str, Any]]
 
     def __init__(
@@ -92,50 +110,14 @@ class MujocoObject(MujocoModel):
         """Add the assets of another model."""
         self.asset.extend(list(other.asset))
 
-    @property
-    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - set by the constructor
-        """Name of the object."""
-        return self._name
-
-    @property
-    def naming_prefix(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - of its name
-        """Text before the names of its elements."""
-        return f"{self._name}_"
-
-    @property
-    def root_body(self) -> str:
-        """Name of its body."""
-        return f"{self._name}_main"
-
-    @property
-    def bodies(self) -> list[str]:
-        """Names of its bodies."""
-        return element_names(self._obj.iter("body"))
-
-    @property
-    def joints(self) -> list[str]:
-        """Names of its joints."""
-        kinds = (*self._obj.iter("joint"), *self._obj.iter("freejoint"))
-        return element_names(kinds)
-
-    @property
-    def sites(self) -> list[str]:
-        """Names of its sites."""
-        return element_names(self._obj.iter("site"))
-
-    @property
-    def contact_geoms(self) -> list[str]:
-        """Names of the geoms that collide."""
-        return element_names(
-            g for g in self._obj.iter("geom") if g.get("contype", "1") != "0"
-        )
-
-    @property
-    def visual_geoms(self) -> list[str]:
-        """Names of the geoms that are drawn only."""
-        return element_names(
-            g for g in self._obj.iter("geom") if g.get("contype", "1") == "0"
-        )
+    bodies: Any = _names("Names of its bodies.", "body")
+    joints: Any = _names("Names of its joints.", "joint", "freejoint")
+    sites: Any = _names("Names of its sites.", "site")
+    contact_geoms: Any = _names("Names of the geoms that collide.", "geom", solid=True)
+    visual_geoms: Any = _names(
+        "Names of the geoms that are drawn only.", "geom", solid=False
+    )
+    root_body: Any = property(lambda self: f"{self.name}_main", doc="Name of its body.")
 
     @property
     def important_sites(self) -> dict[str, str]:
@@ -157,22 +139,15 @@ class MujocoObject(MujocoModel):
 
     def get_bounding_box_half_size(self) -> Vector:
         """Return half the edges of its bounding box, m."""
-        return np.array(
-            [self.horizontal_radius, self.horizontal_radius, self.top_offset[2]]
-        )
+        radius = self.horizontal_radius
+        return np.array([radius, radius, self.top_offset[2]])
 
     def get_bounding_box_size(self) -> Vector:
         """Return the edges of its bounding box, m."""
         return 2.0 * self.get_bounding_box_half_size()
 
 
-def _joints(given: Any) -> list[dict[str, Any]]:
-    if isinstance(given, str):
-        return [dict(FREE)]
-    return [dict(joint) for joint in given or ()]
-
-
-class MujocoXMLObject(MujocoObject, MujocoXML):
+class MujocoXMLObject(MujocoObject, MujocoXML):  # pyright: ignore[reportIncompatibleMethodOverride] - the constructor names it
     """The body named `object` of an MJCF file, or else the first body of its world.
 
     Sites beside it, `bottom_site`, `top_site`, `horizontal_radius_site`, say how far it
@@ -191,7 +166,7 @@ class MujocoXMLObject(MujocoObject, MujocoXML):
         MujocoXML.__init__(self, fname)
         asset = self.asset
         MujocoObject.__init__(self, obj_type, duplicate_collision_geoms, scale)
-        self.asset, self._name, self.joint_specs = asset, name, _joints(joints)
+        self.asset, self._name, self.joint_specs = asset, name, joints_of(joints)
         self._get_object_properties()
 
     def _get_object_subtree(self) -> Element:
@@ -212,18 +187,25 @@ class MujocoXMLObject(MujocoObject, MujocoXML):
     @property
     def bottom_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - read from the file
         """Offset of its lowest point from its origin, m."""
-        return self._extents.get("bottom_site", np.array([0, 0, -self._half()[2]]))
+        return self._extents.get("bottom_site", super().bottom_offset)
 
     @property
     def top_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - read from the file
         """Offset of its highest point from its origin, m."""
-        return self._extents.get("top_site", np.array([0, 0, self._half()[2]]))
+        return self._extents.get("top_site", super().top_offset)
 
-    @property
-    def horizontal_radius(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride] - read from the file
-        """Radius of its upright bounding cylinder, m."""
-        site = self._extents.get("horizontal_radius_site")
-        return float(np.hypot(*(self._half() if site is None else site)[:2]))
+    def _extent(self) -> Extent:
+        return self._measured
+
+    @cached_property
+    def _measured(self) -> Extent:
+        half, sites = self._half(), self._extents
+        radius = sites.get("horizontal_radius_site", half)
+        return Extent(
+            radius=float(np.hypot(*radius[:2])),
+            bottom=-float(sites.get("bottom_site", -half)[2]),
+            top=float(sites.get("top_site", half)[2]),
+        )
 
     def _half(self) -> Vector:
         """Return half the edges of the box around its geoms, from its origin, m."""
@@ -232,10 +214,7 @@ class MujocoXMLObject(MujocoObject, MujocoXML):
         ET.SubElement(world, "worldbody").append(self.get_obj())
         model = MujocoXML(ET.tostring(world, encoding="unicode")).get_model()
         middle, half = np.split(model.geom_aabb, 2, axis=1)
-        turns = (
-            model.geom_quat
-        )  # geoms of the body itself; children's extents are small
-        reach = np.abs(middle) + half if len(turns) else np.zeros((1, 3))
+        reach = np.abs(middle) + half if model.ngeom else np.zeros((1, 3))
         return (np.abs(model.geom_pos) + reach).max(axis=0)
 
     def set_pos(self, pos: Any) -> None:
@@ -280,3 +259,39 @@ class MujocoGeneratedObject(MujocoObject):
             self.asset.append(ET.Element("texture", material.tex_attrib))
         self.asset.append(ET.Element("material", material.mat_attrib))
         self.material = material
+
+
+class TaskObject(MujocoModel):
+    """An object in a scene of ours; its names are those of the scene."""
+
+    def __init__(self, state: ObjectState) -> None:
+        self._state, self._name = state, state.name
+
+    @property
+    def root_body(self) -> str:
+        """Name of its body, robosuite's."""
+        return f"{self.name}_main"
+
+    @property
+    def joints(self) -> list[str]:
+        """Names of its joints, robosuite's."""
+        count = int(self._state.model.body_jntnum[self._state.body])
+        return [f"{self.name}_joint{k}" for k in range(count)]
+
+    @property
+    def contact_geoms(self) -> list[str]:
+        """Names of its geoms that collide."""
+        return [self._state.model.geom(g).name for g in sorted(self._state.geoms)]
+
+    def _extent(self) -> Extent:
+        return self._state.extent()
+
+    @property
+    def sites(self) -> list[str]:
+        """Names of its sites."""
+        model = self._state.model
+        return [
+            model.site(i).name
+            for i in range(model.nsite)
+            if model.site_bodyid[i] == self._state.body
+        ]

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.compat.robosuite.models.objects.bodies import (
-    FREE,
     MujocoGeneratedObject,
     MujocoObject,
+    joints_of,
 )
 from wbc_suite.compat.robosuite.models.objects.shapes import FRICTION
 from wbc_suite.compat.robosuite.utils.mjcf_utils import (
@@ -20,11 +20,8 @@ from wbc_suite.compat.robosuite.utils.mjcf_utils import (
     new_site,
 )
 from wbc_suite.errors import ConfigError
+from wbc_suite.scene.objects import Extent
 from wbc_suite.typing import Vector
-
-
-def _joints(given: Any) -> list[dict[str, Any]]:
-    return [dict(FREE)] if given == "default" else [dict(j) for j in given or ()]
 
 
 def _half_edges(kind: str, size: Sequence[float]) -> Vector:
@@ -71,7 +68,7 @@ class CompositeObject(MujocoGeneratedObject):
         super().__init__("all", duplicate_collision_geoms)
         self._name, count = name, len(geom_types)
         self.total_size = np.array(total_size, np.float64)
-        self.joint_specs, self._sites = _joints(joints), list(sites or ())
+        self.joint_specs, self._sites = joints_of(joints), list(sites or ())
         self._kinds = [obj_types] * count if isinstance(obj_types, str) else obj_types
         one_for_all = {"density": density, "solref": solref, "solimp": solimp}
         columns = {
@@ -114,20 +111,9 @@ class CompositeObject(MujocoGeneratedObject):
         place = np.asarray(object_position)
         return bool(np.all(place > low) and np.all(place < high))
 
-    @property
-    def bottom_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - of its box
-        """Offset of its lowest point from its middle, m."""
-        return np.array([0.0, 0.0, -self.total_size[2]])
-
-    @property
-    def top_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - of its box
-        """Offset of its highest point from its middle, m."""
-        return np.array([0.0, 0.0, self.total_size[2]])
-
-    @property
-    def horizontal_radius(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride] - of its box
-        """Radius of the upright cylinder around its box, m."""
-        return float(np.linalg.norm(self.total_size[:2]))
+    def _extent(self) -> Extent:
+        radius, height = float(np.linalg.norm(self.total_size[:2])), self.total_size[2]
+        return Extent(radius=radius, bottom=height, top=height)
 
 
 def _column(value: Any, key: str, count: int) -> list[Any]:
@@ -160,7 +146,7 @@ class CompositeBodyObject(MujocoGeneratedObject):
         self._name = name
         self.objects = [objects] if isinstance(objects, MujocoObject) else list(objects)
         count = len(self.objects)
-        self.joint_specs, self._sites = _joints(joints), list(sites or ())
+        self.joint_specs, self._sites = joints_of(joints), list(sites or ())
         self._body_joints = dict(body_joints or {})
         self.total_size = None if total_size is None else np.array(total_size)
         if locations_relative_to_corner and self.total_size is None:
@@ -198,7 +184,7 @@ class CompositeBodyObject(MujocoGeneratedObject):
             reach = float(np.abs(middle[:2]).max()) + item.horizontal_radius
             self._radius = max(self._radius, reach)
         for name, joints in self._body_joints.items():
-            for k, joint in enumerate(_joints(joints)):
+            for k, joint in enumerate(joints_of(joints)):
                 given = {"name": f"{name}_joint{k}", **joint}
                 bodies[name or "root"].insert(0, new_joint(**given))
         for k, site in enumerate(self._sites):
@@ -211,20 +197,8 @@ class CompositeBodyObject(MujocoGeneratedObject):
             return self.total_size.copy()
         return super().get_bounding_box_half_size()
 
-    @property
-    def bottom_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - of its parts
-        """Offset of its lowest point from its origin, m."""
-        return np.array([0.0, 0.0, self._bottom])
-
-    @property
-    def top_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - of its parts
-        """Offset of its highest point from its origin, m."""
-        return np.array([0.0, 0.0, self._top])
-
-    @property
-    def horizontal_radius(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride] - of its parts
-        """Radius of an upright cylinder around it, m."""
-        return self._radius
+    def _extent(self) -> Extent:
+        return Extent(radius=self._radius, bottom=-self._bottom, top=self._top)
 
 
 class ObjectGroup:

@@ -3,6 +3,7 @@
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -14,7 +15,7 @@ from wbc_suite.envs.states import write_scene
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene import objects as ours
-from wbc_suite.scene.objects import ObjectState, SceneObject
+from wbc_suite.scene.objects import Extent, ObjectState, SceneObject
 
 OURS = "object"
 """Name of the body in the text of an object."""
@@ -43,7 +44,13 @@ class ReadyMade(MujocoXMLObject):
         self._made = replace(made, motion="fixed")
         joints = self.joints_by_default if joints is None else joints
         super().__init__(_text(self._made, **physics), name, joints, obj_type)
-        self._extents = _extents(self._made)
+
+    @cached_property
+    def _measured(self) -> Extent:
+        model = self._made.compiled_alone()
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        return ObjectState(model, data, self._made.name).extent()
 
     @property
     def important_sites(self) -> dict[str, str]:
@@ -70,19 +77,6 @@ def _text(made: SceneObject, *, density: Any, friction: Any) -> str:
         if friction is not None:
             geom.set("friction", array_to_string(np.atleast_1d(friction)))
     return ET.tostring(root, encoding="unicode")
-
-
-def _extents(made: SceneObject) -> dict[str, Any]:
-    """Return how far an object extends, as sites beside a body of robosuite say it."""
-    model = made.compiled_alone()
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    extent = ObjectState(model, data, made.name).extent()
-    return {
-        "bottom_site": np.array([0.0, 0.0, -extent.bottom]),
-        "top_site": np.array([0.0, 0.0, extent.top]),
-        "horizontal_radius_site": np.array([extent.radius, 0.0, 0.0]),
-    }
 
 
 def _hammer(
@@ -188,3 +182,4 @@ READY_MADE = {
     for kind in _VISUAL
 }
 """Classes of objects by name."""
+globals().update(READY_MADE)

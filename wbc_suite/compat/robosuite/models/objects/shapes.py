@@ -1,21 +1,24 @@
 """Objects of one shape: boxes, balls, cylinders and capsules."""
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from wbc_suite.compat.robosuite.models.objects.bodies import (
-    FREE,
     MujocoGeneratedObject,
+    joints_of,
 )
 from wbc_suite.compat.robosuite.utils.mjcf_utils import Element, get_size, new_geom
 from wbc_suite.errors import ConfigError
+from wbc_suite.scene.objects import Extent
 from wbc_suite.typing import Vector
 
 SMALL, LARGE = 0.07, 0.07
 DENSITY = 1000.0
 FRICTION = (1.0, 0.005, 0.0001)
+CONTACT = ("density", "friction", "solref", "solimp")
 
 
 class PrimitiveObject(MujocoGeneratedObject):
@@ -53,7 +56,7 @@ class PrimitiveObject(MujocoGeneratedObject):
         self.rgba = (0.5, 0.5, 0.5, 1) if rgba is None else rgba
         self.solref = (0.02, 1.0) if solref is None else solref
         self.solimp = (0.9, 0.95, 0.001) if solimp is None else solimp
-        self.joint_specs = [dict(FREE)] if joints == "default" else list(joints or ())
+        self.joint_specs = joints_of(joints)
         self.sanity_check()
         self.material = None
         if material is not None:
@@ -67,54 +70,26 @@ class PrimitiveObject(MujocoGeneratedObject):
 
     def _get_object_subtree(self) -> Element:
         body = ET.Element("body")
-        looks: dict[str, Any] = (
-            {"rgba": self.rgba}
-            if self.material is None
-            else {"material": self.material.name}
-        )
-        body.append(
-            new_geom(
-                "g0",
-                self.kind,
-                self.size,
-                density=self.density,
-                friction=self.friction,
-                solref=self.solref,
-                solimp=self.solimp,
-                condim=4,
-                **looks,
-            )
-        )
+        values = {key: getattr(self, key) for key in CONTACT}
+        if self.material is None:
+            values["rgba"] = self.rgba
+        else:
+            values["material"] = self.material.name
+        body.append(new_geom("g0", self.kind, self.size, condim=4, **values))
         return body
 
-    @property
-    def half_height(self) -> float:
-        """Half its height, m."""
-        return self.size[-1]
-
-    @property
-    def bottom_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - of its size
-        """Offset of its lowest point from its middle, m."""
-        return np.array([0.0, 0.0, -self.half_height])
-
-    @property
-    def top_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - of its size
-        """Offset of its highest point from its middle, m."""
-        return np.array([0.0, 0.0, self.half_height])
-
-    @property
-    def horizontal_radius(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride] - of its size
-        """Radius of its upright bounding cylinder, m."""
-        return self.size[0]
+    def _extent(self) -> Extent:
+        half = sum(self.size) if self.kind == "capsule" else self.size[-1]
+        return Extent(radius=self.size[0], bottom=half, top=half)
 
 
 class BoxObject(PrimitiveObject):
     """A box."""
 
-    @property
-    def horizontal_radius(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride] - of its size
-        """Half the diagonal of its base, m."""
-        return float(np.hypot(self.size[0], self.size[1]))
+    def _extent(self) -> Extent:
+        return replace(
+            super()._extent(), radius=float(np.hypot(self.size[0], self.size[1]))
+        )
 
     def get_bounding_box_half_size(self) -> Vector:
         """Return half its edges, m."""
@@ -137,8 +112,3 @@ class CapsuleObject(PrimitiveObject):
     """An upright capsule."""
 
     kind, count = "capsule", 2
-
-    @property
-    def half_height(self) -> float:
-        """Half its height with both caps, m."""
-        return self.size[0] + self.size[1]

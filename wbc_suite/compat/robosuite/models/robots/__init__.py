@@ -11,9 +11,13 @@ import pinocchio as pin
 
 from wbc_suite import logs
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.compat.robosuite.models.described import DescribedModel, choices_of
+from wbc_suite.compat.robosuite.models.base import (
+    SECTIONS,
+    DescribedModel,
+    choices_of,
+    shown_names,
+)
 from wbc_suite.compat.robosuite.models.own_files import arm_file, changed, gripper_file
-from wbc_suite.compat.robosuite.models.robots.mounting import Mounting
 from wbc_suite.compat.robosuite.models.robots.passive import with_passive_joints
 from wbc_suite.compat.robosuite.utils.transform_utils import euler2mat
 from wbc_suite.errors import UnknownNameError
@@ -23,15 +27,6 @@ from wbc_suite.sensing.hands import gripper_links
 from wbc_suite.typing import Vector
 
 log = logs.logger(__name__)
-
-__all__ = [
-    "REGISTERED_ROBOTS",
-    "ManipulatorModel",
-    "RobotModel",
-    "create_robot",
-    "is_robosuite_robot",
-    "register_robot",
-]
 
 REGISTERED_ROBOTS: dict[str, type["RobotModel"]] = {}
 """Classes of robot models by name."""
@@ -54,6 +49,7 @@ class RobotModel(DescribedModel):
 
     robot: str = ""
     arms: Any = ()
+    _base_name: str | None = None
     as_there = True
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -116,25 +112,35 @@ class RobotModel(DescribedModel):
             return mirrored
         return gripper
 
-    @property
-    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its class's
-        """Name of its class and its number."""
-        return f"{type(self).__name__}{self.idn}"
-
-    @property
-    def naming_prefix(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its number's
-        """Text before the names of its elements."""
-        return f"robot{self.idn}_"
-
-    @property
-    def dof(self) -> int:
-        """Number of its driven joints, without grippers."""
-        return len(self.own_joints)
-
-    @property
-    def joints(self) -> list[str]:
-        """Names of its joints in the scene, without those of grippers."""
-        return self.shown("joint", self.own_joints)
+    name: Any = property(
+        lambda self: f"{type(self).__name__}{self.idn}",
+        doc="Name of its class and its number.",
+    )
+    naming_prefix: Any = property(
+        lambda self: f"robot{self.idn}_", doc="Text before the names of its elements."
+    )
+    dof: Any = property(
+        lambda self: len(self.own_joints),
+        doc="Number of its driven joints, without grippers.",
+    )
+    joints = all_joints = shown_names(
+        "joint", "own_joints", "Names of its joints in the scene, without grippers'."
+    )
+    arm_joints = shown_names(
+        "joint", "own_arm_joints", "Names of the joints of its arms in the scene."
+    )
+    actuators = shown_names(
+        "actuator", "own_joints", "Names of the actuators of its joints."
+    )
+    root_body: Any = property(
+        lambda self: self.bodies[0], doc="Name of its first body."
+    )
+    contact_geoms = _contact_geoms = property(
+        lambda self: self._geoms("collision"), doc="Names of its geoms that collide."
+    )
+    visual_geoms = property(
+        lambda self: self._geoms("visual"), doc="Names of its geoms that are drawn."
+    )
 
     @property
     def own_joints(self) -> list[str]:
@@ -144,24 +150,12 @@ class RobotModel(DescribedModel):
         own = [j.name for j in robot.joints if j.mimic is None]
         return [prefix + name for name in own if name not in fingers]
 
-    all_joints = joints
-
-    @property
-    def arm_joints(self) -> list[str]:
-        """Names of the joints of its arms in the scene."""
-        return self.shown("joint", self.own_arm_joints)
-
     @property
     def own_arm_joints(self) -> list[str]:
         """Names of the joints of its arms in our model."""
         groups = self.description.groups
         names = [j for g, js in groups.items() if g.endswith("arm") for j in js]
         return [self.naming_prefix + name for name in names]
-
-    @property
-    def actuators(self) -> list[str]:
-        """Names of the actuators of its joints."""
-        return self.shown("actuator", self.own_joints)
 
     @property
     def own_links(self) -> list[Any]:
@@ -178,21 +172,9 @@ class RobotModel(DescribedModel):
         return self.shown("body", [self.naming_prefix + link.name for link in links])
 
     @property
-    def root_body(self) -> str:
-        """Name of its first body."""
-        return self.bodies[0]
-
-    @property
     def sites(self) -> list[str]:
         """Names of its sites."""
         return [self.naming_prefix + frame.name for frame in self.description.frames]
-
-    @property
-    def contact_geoms(self) -> list[str]:
-        """Names of its geoms that collide."""
-        return self._geoms("collision")
-
-    _contact_geoms = contact_geoms
 
     def set_joint_attribute(self, attrib: str, values: Any, force: bool = True) -> None:
         """Write armature, damping or frictionloss of its joints, one value or each.
@@ -217,11 +199,6 @@ class RobotModel(DescribedModel):
     def _fingers(self) -> list[str]:
         groups = self.description.groups.items()
         return [j for g, js in groups if g.endswith("gripper") for j in js]
-
-    @property
-    def visual_geoms(self) -> list[str]:
-        """Names of its geoms that are drawn only."""
-        return self._geoms("visual")
 
     def _geoms(self, kind: str) -> list[str]:
         own = ((link.name, len(getattr(link, kind))) for link in self.own_links)
@@ -285,7 +262,7 @@ def _is_overridden(model: RobotModel, name: str) -> bool:
     return getattr(type(model), name) is not getattr(RobotModel, name)
 
 
-class ManipulatorModel(Mounting, RobotModel):
+class ManipulatorModel(RobotModel):
     """A robot with arms; for a user's, `init_qpos` of the MJCF's first key counts."""
 
     @property
@@ -317,6 +294,30 @@ class ManipulatorModel(Mounting, RobotModel):
         """Name of the body at the end of each arm in our model."""
         ends, prefix = self._eef_name, self.naming_prefix
         return {arm: prefix + ends[arm] for arm in self.description.hands}
+
+    def add_gripper(self, gripper: Any, arm_name: str | None = None) -> None:
+        """Mount a gripper on an arm: `right`, or the body at its end; else the first.
+
+        Raises:
+            UnknownNameError: If there is no such arm.
+        """
+        arms = {body: arm for arm, body in self.eef_name.items()}
+        arm = arms.get(arm_name or "", arm_name or next(iter(self.eef_name)))
+        if arm not in self.eef_name:
+            raise UnknownNameError("arm", arm_name, (*self.eef_name, *arms))
+        self.grippers[arm] = gripper
+        self._mount()
+
+    def add_base(self, base: Any) -> None:
+        """Put the robot on a base."""
+        self._base_name = type(base).__name__
+        self._mount()
+
+    def _mount(self) -> None:
+        chosen = {arm: type(item).__name__ for arm, item in self.grippers.items()}
+        self.load(chosen or "default", self._base_name)
+        for name in (*SECTIONS, "root", "tree", "folder"):
+            self.__dict__.pop(name, None)  # they are written again when asked for
 
 
 def register_robot(target_class: type[RobotModel]) -> type[RobotModel]:

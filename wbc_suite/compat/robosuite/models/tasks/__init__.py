@@ -4,16 +4,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import mujoco
-import numpy as np
 
+from wbc_suite.compat.robosuite.forwarding import does_nothing
 from wbc_suite.compat.robosuite.models.base import MujocoXML
-from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.scene import ArenaConfig, Push
 from wbc_suite.sensing.reading import Reading
-
-__all__ = ["ManipulationTask", "MujocoWorldBase", "Task", "TaskBenchmark"]
 
 
 class MujocoWorldBase(MujocoXML):
@@ -104,19 +101,11 @@ class TaskBenchmark:
                 spec.delete(element)
         spec.attach(own, prefix="", frame=spec.worldbody.add_frame())
 
-    def equip(self, spec: mujoco.MjSpec, robots: Sequence[RobotDescription]) -> None:
-        """Add nothing to the robots."""
-
-    def bind(
-        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
-    ) -> None:
-        """Look up nothing."""
-
-    def reset(self, rng: np.random.Generator) -> None:
-        """Leave objects where they are; `env._reset_internal` moves them."""
-
-    def after_step(self) -> None:
-        """Do nothing."""
+    equip = does_nothing("robots stay as they are")
+    bind = does_nothing("the environment looks elements up")
+    reset = does_nothing("`env._reset_internal` moves objects")
+    after_step = does_nothing("there is no state of its own")
+    failure = does_nothing("no state is a failure")
 
     def observables(self) -> dict[str, Reading]:
         """Return none; those of the environment are `Observable`s."""
@@ -129,10 +118,6 @@ class TaskBenchmark:
     def success(self) -> bool:
         """Return False; the environment's `_check_success` decides."""
         return False
-
-    def failure(self) -> str | None:
-        """Return None."""
-        return None
 
     def reward(self, *, shaped: bool, success: bool | None = None) -> float:
         """Return 0; the environment's `reward` decides."""

@@ -1,5 +1,0 @@
-"""MuJoCo's writer of USD files, under robosuite's name; needs `usd-core`."""
-
-from mujoco.usd import exporter
-
-USDExporter = exporter.USDExporter
