@@ -32,6 +32,7 @@ import numpy as np  # isort: skip  (after harness: it sets the number of threads
 import pinocchio as pin
 
 import wbc_suite
+from wbc_suite.compiling import as_argument
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.qp import (
     ComTask,
@@ -175,7 +176,7 @@ class Ours:
 
     def once_more(self) -> int:
         """Solve the tick's QP again, ns: inside the compiled tick there is no clock."""
-        qp = self.stack.levels[0].arrays.qp
+        qp = as_argument(self.stack.levels[0].qp)
         start = clock()
         solve_warm(qp)
         return clock() - start

@@ -1,4 +1,7 @@
-"""A task and a limit of your own in the whole-body controller, named in its file."""
+"""A task and a limit of your own in the whole-body controller, named in its file.
+
+The task has a kernel, so that it runs in the compiled control loop as ours do.
+"""
 
 import tomllib
 
@@ -10,31 +13,46 @@ from wbc_suite.qp import (
     BoxLimit,
     JointBounds,
     RowTask,
+    record_type,
     register_limit,
     register_task,
 )
+
+LEVEL = record_type(("joint", "i8"), ("axis", "f8", (3,)))
+"""Numbers of a task: the joint that carries the frame, and the axis in it."""
+
+
+def level_rows(robot, own, dt, rows, values) -> None:  # noqa: ANN001, compiled
+    """Write `e = a x z` and J, with a in world axes: `d(e) = -J dq`."""
+    level, a = own.view(LEVEL)[0], np.empty(3)
+    T, axis, j = robot.pose[level.joint], level.axis, level.joint
+    for i in range(3):  # poses have the rotation column by column
+        a[i] = T[i] * axis[0] + T[3 + i] * axis[1] + T[6 + i] * axis[2]
+    values[0], values[1], values[2] = a[1], -a[0], 0.0
+    while j > 0:  # to the root of the robot
+        joint = robot.joints[j]
+        for col in range(joint.v_start, joint.v_start + joint.v_count):
+            w = robot.jacobian[col, 3:]
+            for i in range(3):
+                rows[i, col] = a[2] * w[i] - a[i] * w[2]
+        j = joint.parent
 
 
 class LevelTask(RowTask):
     """Keep an axis of a frame upright, so that a cup is not spilled: e = a x z, rad."""
 
+    kernel = level_rows
+
     def __init__(self, frame: str, *, axis: list[float], cost: float = 1.0) -> None:
         super().__init__(f"{frame} level", dim=3, cost=cost, gain=0.2, max_speed=2.0)
         self.frame, self.axis = frame, np.asarray(axis)
 
-    def bind(self, configuration: Configuration) -> None:
-        """Resolve the frame."""
-        self.index = configuration.frame_id(self.frame)
-
-    def evaluate(
-        self, configuration: Configuration, error: np.ndarray, jacobian: np.ndarray
-    ) -> None:
-        """Write `e = a x z` and J, with a in world axes: `d(e) = -J dq`."""
-        a = configuration.frame_pose(self.index).rotation @ self.axis
-        up = np.array([0.0, 0.0, 1.0])
-        J_w = configuration.frame_jacobian(self.index, "aligned")[3:]
-        error[:] = np.cross(a, up)
-        jacobian[:] = np.dot(up, a) * J_w - np.outer(a, up @ J_w)
+    def own(self, configuration: Configuration) -> np.ndarray:
+        """Return what the kernel reads."""
+        frame = configuration.model.frames[configuration.frame_id(self.frame)]
+        level = np.zeros(1, LEVEL)
+        level[0] = frame.parentJoint, frame.placement.rotation @ self.axis
+        return level.view(np.float64)
 
 
 class Slow(BoxLimit):

@@ -7,6 +7,7 @@ import ctypes
 import inspect
 import logging
 import time
+import warnings
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any, ClassVar, TypeVar, cast, get_args, get_type_hints
 
 import numba
 import numpy as np
-from numba import types
+from numba import errors, types
 from numba.core import event
 from numba.experimental import structref
 from numba.extending import register_jitable
@@ -229,6 +230,15 @@ def readable(records: Records) -> Records:
     return records.view(np.recarray)
 
 
+def record_type(*fields: tuple[Any, ...]) -> np.dtype[Any]:
+    """Return a type of records, 8 bytes a number, that kernels and Python read alike.
+
+    Args:
+        fields: Name, "f8" or "i8", and a shape where it is an array.
+    """
+    return np.dtype((np.record, list(fields)))
+
+
 def struct(fields: type[Fields]) -> type[Fields]:
     """Let kernels take a named tuple of arrays and numbers as one argument.
 
@@ -272,7 +282,11 @@ def as_argument(values: Fields) -> Fields:
     if _numba.DISABLE_JIT or not (pack or kind is tuple):
         return values
     fields: Any = tuple(map(as_argument, values))
-    return pack(kind(*fields)) if pack else fields
+    if not pack:
+        return fields
+    with warnings.catch_warnings():  # a tuple of functions is new in numba
+        warnings.simplefilter("ignore", errors.NumbaExperimentalFeatureWarning)
+        return pack(kind(*fields))
 
 
 class _StructType(types.StructRef):

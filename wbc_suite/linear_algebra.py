@@ -23,7 +23,7 @@ def dot(a: Vector, b: Vector, n: int) -> float:
     return total
 
 
-@compiled
+@inner
 def copy_vector(source: Vector, target: Vector) -> None:
     """Write a vector to the first entries of another one, which may be longer."""
     # For `target[:n] = source` numba compiles much more: errors, arrays that overlap.
@@ -31,7 +31,7 @@ def copy_vector(source: Vector, target: Vector) -> None:
         target[i] = source[i]
 
 
-@compiled
+@inner
 def copy_rows(source: Matrix, target: Matrix) -> None:
     """Write a matrix to the first rows of another one of as many columns."""
     for i in range(source.shape[0]):
@@ -48,7 +48,7 @@ def cross(a: Vector, b: Vector) -> Vector:
     return c
 
 
-@compiled
+@inner
 def cholesky(A: Matrix, n: int, tolerance: float) -> int:
     """Factorise `A = L L^T` in place; return the number of independent rows.
 
@@ -76,14 +76,14 @@ def cholesky(A: Matrix, n: int, tolerance: float) -> int:
     return rank
 
 
-@compiled
+@inner
 def solve_lower(L: Matrix, x: Vector, n: int) -> None:
     """Solve `L x = b` in place; the diagonal of L is inverted."""
     for i in range(n):
         x[i] = (x[i] - dot(L[i], x, i)) * L[i, i]
 
 
-@compiled
+@inner
 def solve_upper(L: Matrix, x: Vector, n: int) -> None:
     """Solve `L^T x = b` in place; the diagonal of L is inverted."""
     for i in range(n - 1, -1, -1):
@@ -93,7 +93,7 @@ def solve_upper(L: Matrix, x: Vector, n: int) -> None:
             x[j] -= row[j] * value
 
 
-@compiled
+@inner
 def solve(A: Matrix, B: Matrix, n: int) -> None:  # noqa: C901, one elimination
     """Solve `A X = B` in place by Gaussian elimination with partial pivoting.
 
@@ -141,7 +141,7 @@ def lq_factor(Q: Matrix, n: int, L: Matrix) -> None:
             row[j] *= L[i, i]
 
 
-@compiled
+@inner
 def lq_solve(Q: Matrix, n: int, y: Vector, x: Vector) -> None:
     """Write the shortest x with `Q x = y`: the least squares solution of `A x = b`.
 
@@ -160,7 +160,7 @@ def lq_solve(Q: Matrix, n: int, y: Vector, x: Vector) -> None:
             x[j] += row[j] * missing
 
 
-@compiled
+@inner
 def inverse_trace(L: Matrix, column: Vector) -> float:
     """Return `1 / trace((L L^T)^-1)`, a lower bound of the least eigenvalue.
 
@@ -178,7 +178,7 @@ def inverse_trace(L: Matrix, column: Vector) -> float:
     return 1.0 / total
 
 
-@compiled
+@inner
 def row_space(W: Matrix, tolerance: float, V: Matrix, lengths: Vector) -> int:
     """Write an orthonormal basis of the rows of W, longest first; return the rank.
 

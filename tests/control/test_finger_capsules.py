@@ -38,14 +38,14 @@ class Hands:
         reduced = self.controller._configuration.model
         errors = {}
         for k, capsule in enumerate(limit.capsules):
-            joint = reduced.names[int(limit.arrays.joint[k])]
+            joint = reduced.names[int(limit.placed["joint"][k])]
             carrier = measured.model.getJointId(joint)
-            if not limit.arrays.joint[k]:
+            if not limit.placed["joint"][k]:
                 continue
             T = measured.data.oMi[carrier]
             link = measured.frame_pose(capsule.link)
-            for end, at in zip((capsule.start, capsule.end), (0, 3), strict=True):
-                placed = T * limit.arrays.ends[k, at : at + 3]
+            for end, at in zip((capsule.start, capsule.end), (0, 1), strict=True):
+                placed = T * limit.placed["ends"][k, at]
                 error = np.linalg.norm(placed - link * np.asarray(end))
                 errors[capsule.link] = max(errors.get(capsule.link, 0.0), error)
         return errors
@@ -70,9 +70,9 @@ def test_capsules_move_with_the_measured_fingers(name):
 @pytest.mark.slow
 def test_ticks_place_the_fingers():
     hands = Hands("GR1")
-    before = hands.limit.arrays.ends.copy()
+    before = hands.limit.placed["ends"].copy()
     hands.close()
-    moved = np.abs(hands.limit.arrays.ends - before).max(axis=1) > 5e-3
+    moved = np.abs(hands.limit.placed["ends"] - before).max(axis=(1, 2)) > 5e-3
     links = {hands.limit.capsules[k].link for k in np.flatnonzero(moved)}
     assert "R_index_intermediate_link" in links
     assert len(links) >= 10

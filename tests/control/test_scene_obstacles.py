@@ -98,11 +98,11 @@ def test_distances_are_those_of_the_simulator(name):
         scene.obstacles.measure()
         scene.rows()
         truth = scene.truth()
-        rows = np.flatnonzero(limit.arrays.found >= 0)
+        rows = np.flatnonzero(limit.planes["found"] >= 0)
         found = {}
         for row in rows.tolist():
             pair = limit.subject(row)
-            key, d = (pair.first, pair.second), float(limit.arrays.distance[row])
+            key, d = (pair.first, pair.second), float(limit.planes["distance"][row])
             found[key] = min(found.get(key, np.inf), d)
         for key, d in found.items():
             assert d >= truth[key] - 1e-5
@@ -121,7 +121,7 @@ def test_the_nearest_geoms_of_each_body_and_obstacle_have_rows(name):
     for _ in range(5):
         scene.write(rng.uniform(low, high))
         scene.obstacles.measure()
-        listed = {int(k) for k in scene.obstacles.limit.arrays.found if k >= 0}
+        listed = {int(k) for k in scene.obstacles.limit.planes["found"] if k >= 0}
         groups = {}
         for k, pair in enumerate(zip(arrays.obstacle, arrays.geom, strict=True)):
             d = mujoco.mj_geomDistance(
@@ -139,16 +139,16 @@ def test_the_nearest_geoms_of_each_body_and_obstacle_have_rows(name):
 @pytest.mark.slow
 def test_rows_are_the_derivative_of_the_distance():
     scene, rng = Scene("Panda"), np.random.default_rng(0)
-    arrays = scene.obstacles.limit.arrays
+    planes = scene.obstacles.limit.planes
     scene.write(np.array([0.0, 1.0, 0.0, -1.0, 0.0, 2.0, 0.0]))
     scene.obstacles.measure()
     G, _ = scene.rows()
-    used, before = arrays.found >= 0, arrays.distance.copy()
+    used, before = planes["found"] >= 0, planes["distance"].copy()
     step = 1e-6 * rng.normal(size=scene.configuration.nv)
     scene.configuration.update(scene.configuration.integrate(step))
     scene.rows()
     assert used.sum() > 5
-    change = arrays.distance[used] - before[used]
+    change = planes["distance"][used] - before[used]
     np.testing.assert_allclose(change, -G[used] @ step, atol=1e-10)
 
 
@@ -157,25 +157,25 @@ def test_rows_are_the_derivative_of_the_distance():
 def test_what_slides_fast_is_kept_off_by_its_speed(name):
     """Planes stand off by 20 ms of the measured speed along them beyond 0.3 m/s."""
     scene, rng = Scene(name), np.random.default_rng(0)
-    model, data, limit = scene.model, scene.data, scene.obstacles.limit.arrays
+    model, data, limit = scene.model, scene.data, scene.obstacles.limit.planes
     pairs = scene.obstacles._arrays
     scene.write(scene.env.simulation.controllers[0].q)
     scene.obstacles.measure()
-    still, found = limit.plane.copy(), limit.found.copy()
+    still, found = limit["offset"].copy(), limit["found"].copy()
     data.qvel[:] = rng.normal(size=model.nv)
     mujoco.mj_forward(model, data)
     scene.obstacles.measure()
-    np.testing.assert_array_equal(limit.found, found)
+    np.testing.assert_array_equal(limit["found"], found)
     segment, J, most = np.zeros(6), np.zeros((3, model.nv)), 0.0
     for row in np.flatnonzero(found >= 0).tolist():
         obstacle, geom = int(pairs.obstacle[found[row]]), int(pairs.geom[found[row]])
         mujoco.mj_geomDistance(model, data, obstacle, geom, 9.0, segment)
         body = int(model.geom_bodyid[geom])
         mujoco.mj_jac(model, data, J, None, segment[3:], body)
-        velocity, n = J @ data.qvel, limit.plane[row, :3]
+        velocity, n = J @ data.qvel, limit["normal"][row]
         along = np.linalg.norm(velocity - n * (n @ velocity))
         off = 0.02 * max(along - 0.3, 0.0)
-        assert limit.plane[row, 3] - still[row, 3] == pytest.approx(off, abs=1e-9)
+        assert limit["offset"][row] - still[row] == pytest.approx(off, abs=1e-9)
         most = max(most, off)
     assert most > 1e-3
 

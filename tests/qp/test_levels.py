@@ -25,7 +25,7 @@ def test_lower_levels_do_not_leak_into_upper_ones(humanoid, rng):
             task.set_target(target)
         alone.reset(stack.v_previous)
         solution, reference = stack.solve(DT), alone.solve(DT)
-        W = stack.levels[0].tasks.W
+        W = stack.levels[0].qp.W
         leak = np.abs(W @ (solution.dq - reference.dq)).max()
         assert leak <= 1e-9  # the issue asks for 1e-5
         humanoid.update(humanoid.integrate(solution.dq))
@@ -38,10 +38,10 @@ def test_a_level_is_optimal_among_what_the_upper_leave(humanoid):
     q[7:] += 0.1
     posture.set_target(q)
     solution = stack.solve(DT)
-    W, mu = stack.levels[0].tasks.W, float(stack.levels[1].tasks.mu[0])
+    W, mu = stack.levels[0].qp.W, float(stack.levels[1].qp.mu[0])
     _, s, Vt = np.linalg.svd(W)
     N = Vt[(s > 1e-9).sum() :].T
-    weights, steps = stack.levels[1].tasks.diagonal
+    weights, steps = stack.levels[1].qp.diagonal
     gradient = (weights + mu) * solution.dq - steps
     np.testing.assert_allclose(N.T @ gradient, 0.0, atol=1e-10)
     assert np.abs(solution.dq).max() > 1e-3

@@ -12,7 +12,8 @@ from wbc_suite.qp import (
     Relaxed,
     TaskStack,
 )
-from wbc_suite.qp.overshoot import turned
+from wbc_suite.qp.part import STATE
+from wbc_suite.qp.tick import turned
 
 DT = 0.01
 
@@ -49,7 +50,8 @@ def swinging(arm):
 
 def damping(solution):
     record = solution.record
-    return float(record.layout.results(record.buffer)["overshoot_damping"][0])
+    state = record.layout.results(record.buffer)["state"].view(STATE)
+    return float(state["overshoot_damping"][0])
 
 
 def test_damping_grows_by_a_fifth_of_all_damping_while_targets_rest(arm):

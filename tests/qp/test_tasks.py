@@ -136,7 +136,7 @@ def test_normal_equations_agree_with_matrix_product(humanoid, rng):
     )
     humanoid.update(humanoid.integrate(rng.normal(size=humanoid.nv) * 0.2))
     stack.solve(5e-3)
-    level, problem = stack.levels[0].tasks, stack.problem()
+    level, problem = stack.levels[0].qp, stack.problem()
     mu = 1e-2 + np.abs(level.e) @ np.abs(level.W).max(axis=1)
     H = level.W.T @ level.W + np.diag(level.diagonal[0] + mu)
     c = -level.W.T @ level.e - level.diagonal[1]
@@ -149,7 +149,7 @@ def test_rows_are_weighted_jacobian_and_saturated_step(humanoid, rng):
     for task in tasks_with_jacobian(rng):
         stack = TaskStack(humanoid, [task])
         stack.solve(dt)
-        rows = stack.levels[0].tasks
+        rows = stack.levels[0].qp
         error = task.error(humanoid)
         expected = task.cost[:, None] * task.jacobian(humanoid)
         np.testing.assert_allclose(rows.W, expected, atol=1e-12)
@@ -194,7 +194,7 @@ def test_posture_of_a_free_root_is_a_difference_of_poses(humanoid, rng):
     stack = TaskStack(humanoid, [task])
     stack.solve(1e-2)
     error = pin.difference(humanoid.model, humanoid.q, target)
-    weights, steps = stack.levels[0].tasks.diagonal
+    weights, steps = stack.levels[0].qp.diagonal
     np.testing.assert_array_equal(weights[:6], 4.0)
     np.testing.assert_allclose(steps, weights * error, atol=1e-12)
 
@@ -205,7 +205,7 @@ def test_steps_are_saturated(arm):
     task = FrameTask("hand", target=far, position_cost=2.0)
     stack = TaskStack(arm, [task])
     stack.solve(0.01)
-    e = stack.levels[0].tasks.e
+    e = stack.levels[0].qp.e
     np.testing.assert_allclose(e, [2.0 * 0.01, 0, 0, 0, 0, 0], atol=1e-12)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from wbc_suite.errors import ConfigError
 from wbc_suite.qp import (
     AccelerationLimit,
     ComTask,
@@ -13,7 +14,6 @@ from wbc_suite.qp import (
     FrameEquality,
     FrameTask,
     JointTask,
-    Kernel,
     LimitKind,
     LinearEquality,
     ObstacleLimit,
@@ -24,8 +24,9 @@ from wbc_suite.qp import (
     SelfCollisionLimit,
     TaskStack,
     VelocityLimit,
+    record_type,
 )
-from wbc_suite.qp.kernel import kernel_of
+from wbc_suite.qp.part import kernel_of
 
 DT = 5e-3
 
@@ -105,7 +106,7 @@ def test_a_users_task_is_met_and_reported(arm):
     stack = TaskStack(arm, [task, PostureTask(1e-2)])
     assert not stack.is_compiled
     stack.solve(DT)
-    assert stack.levels[0].tasks.e[0] == pytest.approx(5.0 * 0.5 * DT)  # saturated
+    assert stack.levels[0].qp.e[0] == pytest.approx(5.0 * 0.5 * DT)  # saturated
     report = stack.explain()["height of hand"]
     assert not report.reached
     assert report.position_error == pytest.approx(0.1)
@@ -166,7 +167,7 @@ def test_a_subclass_of_a_compiled_task_is_evaluated_itself(arm):
 
 def test_a_subclass_that_overrides_evaluate_may_declare_its_kernel(arm):
     class NamedFrameTask(OwnFrameTask):
-        kernel = Kernel.FRAME
+        kernel = FrameTask.kernel
 
     assert TaskStack(arm, [NamedFrameTask("hand")]).is_compiled
 
@@ -201,7 +202,7 @@ def test_an_override_anywhere_below_leaves_the_kernel(base):
     mixin = type("Mixin", (), {method: lambda *arguments: None})
     between = type("Between", (mixin, base), {})
     part = object.__new__(type("Below", (between,), {}))
-    assert kernel_of(part) is Kernel.PYTHON
+    assert kernel_of(part) is None
 
 
 def test_a_part_without_a_kernel_is_named_once(arm, caplog):
@@ -271,7 +272,7 @@ def test_targets_follow_a_task_into_all_stacks_that_hold_it(arm):
     stack = stacks[0]
     stack.solve(DT)
     assert stack.explain()["hand"].position_error == pytest.approx(0.1)
-    np.testing.assert_allclose(stack.levels[0].tasks.cost[:3], 3.0)
+    np.testing.assert_allclose(stack.levels[0].arrays.cost[:3], 3.0)
 
 
 def test_a_solution_prints_what_tasks_lack_and_what_holds_them(arm):
@@ -298,12 +299,109 @@ def test_a_record_explains_its_own_tick_after_the_next_ones(arm):
     assert str(stack.solution()) != text
 
 
-def test_two_self_collision_limits_are_both_kept(arm):
-    """Only the first has a kernel; the second is evaluated in Python."""
-    stack = TaskStack(
-        arm,
-        [FrameTask("hand")],
-        limits=[SelfCollisionLimit((), (), nearest=2), SelfCollisionLimit((), ())],
-    )
-    assert not stack.is_compiled
-    assert stack.solve(DT).ok
+def test_limits_of_one_kind_all_have_kernels_while_there_is_room(arm):
+    """Of nine limits seven have a kernel; Python evaluates the others."""
+    for count, compiled in ((7, True), (9, False)):
+        limits = [SelfCollisionLimit((), (), nearest=1 + k) for k in range(count)]
+        stack = TaskStack(arm, [FrameTask("hand")], limits=limits)
+        assert stack.is_compiled == compiled
+        assert stack.solve(DT).ok
+
+
+HEIGHT = record_type(("joint", "i8"), ("point", "f8", (3,)), ("height", "f8"))
+
+
+def height_rows(robot, own, dt, rows, values):
+    """Write how far a point is below a height, and how fast it rises."""
+    task = own.view(HEIGHT)[0]
+    T, p, j = robot.pose[task.joint], task.point, task.joint
+    x = T[9] + T[0] * p[0] + T[3] * p[1] + T[6] * p[2]
+    y = T[10] + T[1] * p[0] + T[4] * p[1] + T[7] * p[2]
+    values[0] = task.height - (T[11] + T[2] * p[0] + T[5] * p[1] + T[8] * p[2])
+    while j > 0:
+        joint = robot.joints[j]
+        for col in range(joint.v_start, joint.v_start + joint.v_count):
+            J = robot.jacobian[col]
+            rows[0, col] = J[2] + J[3] * y - J[4] * x
+        j = joint.parent
+
+
+class WithKernel:
+    """What a part with the kernel above has in place of a Python method."""
+
+    kernel = height_rows
+
+    def own(self, configuration):
+        frame = configuration.model.frames[configuration.frame_id(self.frame)]
+        own = np.zeros(1, HEIGHT)
+        own[0] = frame.parentJoint, frame.placement.translation, self.height
+        return own.view(np.float64)
+
+
+class CompiledHeight(WithKernel, RowTask):
+    """`HeightTask` with a kernel."""
+
+    def __init__(self, frame, height, **options):
+        super().__init__(f"height of {frame}", dim=1, **options)
+        self.frame, self.height = frame, height
+
+
+class CompiledCeiling(WithKernel, RowLimit):
+    """`CeilingLimit` with a kernel."""
+
+    dim = 1
+
+    def __init__(self, frame, height):
+        self.frame, self.height = frame, height
+
+    def subject(self, row):
+        return f"{self.frame} below {self.height:g} m"
+
+
+class CompiledShelf(WithKernel, Equality):
+    """Lets a frame stay at a height."""
+
+    dim, name = 1, "shelf"
+
+    def __init__(self, frame, height):
+        self.frame, self.height = frame, height
+
+
+class Shelf(CompiledShelf):
+    """The same by its Python method."""
+
+    def rows(self, configuration, dt, A, b):
+        A[0] = configuration.frame_jacobian(self.frame, "aligned")[2]
+        b[0] = self.height - configuration.frame_pose(self.frame).translation[2]
+
+
+def test_parts_with_a_kernel_do_what_their_python_methods_do(arm):
+    height, start = arm.frame_pose("hand").translation[2], arm.q.copy()
+    found = []
+    for task, ceiling, shelf in (
+        (CompiledHeight, CompiledCeiling, CompiledShelf),
+        (HeightTask, CeilingLimit, Shelf),
+    ):
+        arm.update(start)
+        tasks = [task("hand", height + 0.1, cost=5.0), PostureTask(1e-2)]
+        limits = [ceiling("hand", height + 0.05)]
+        stack = TaskStack(arm, tasks, limits=limits, escape=False)
+        assert stack.is_compiled == (task is CompiledHeight)
+        solution = run(stack, 0.2)
+        equalities = [shelf("hand", height)]
+        held = run(TaskStack(arm, [PostureTask(1.0)], equalities=equalities), 0.2)
+        found.append((solution.dq, solution.active, held.dq, arm.q.copy()))
+    for ours, theirs in zip(*found, strict=True):
+        if isinstance(ours, tuple):
+            assert [str(x) for x in ours] == [str(x) for x in theirs]
+        else:
+            np.testing.assert_allclose(ours, theirs, atol=1e-12)
+    assert any("below" in str(x) for x in found[0][1])
+
+
+def test_a_part_without_kernel_and_method_says_so(arm):
+    class Nothing(RowTask):
+        """Computes nothing."""
+
+    with pytest.raises(ConfigError, match="Nothing has no kernel"):
+        TaskStack(arm, [Nothing("nothing", dim=1)]).solve(DT)

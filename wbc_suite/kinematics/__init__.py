@@ -2,5 +2,6 @@
 
 from wbc_suite.kinematics.configuration import Axes, Configuration
 from wbc_suite.kinematics.conversions import Conversion
+from wbc_suite.kinematics.forward import RobotArrays
 
-__all__ = ["Axes", "Configuration", "Conversion"]
+__all__ = ["Axes", "Configuration", "Conversion", "RobotArrays"]

@@ -61,7 +61,9 @@ class Configuration:
         self.arrays: RobotArrays = robot_arrays(model)
         self.robot = as_argument(self.arrays)
         self.q: Vector = self.arrays.q
-        self._by_pinocchio = bool((self.arrays.kind[1:] == JointKind.OTHER).any())
+        self._by_pinocchio = bool(
+            (self.arrays.joints["kind"][1:] == JointKind.OTHER).any()
+        )
         self.root_linear, self.root_angular = _root_indices(model)
         self._frame_ids = {f.name: i for i, f in enumerate(model.frames)}
         self._nframes = len(model.frames)
@@ -142,7 +144,8 @@ class Configuration:
         """Return the unit of each velocity's position: m or rad."""
         units = ["rad"] * self.nv
         linear = {JointKind.PRISMATIC.value: 1, JointKind.FREE.value: 3}
-        for kind, i in zip(self.arrays.kind, self.arrays.v_start, strict=True):
+        joints = self.arrays.joints
+        for kind, i in zip(joints["kind"], joints["v_start"], strict=True):
             count = linear.get(int(kind), 0)
             units[i : i + count] = ["m"] * count
         return tuple(units)

@@ -9,8 +9,21 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import compiled, inner, struct
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.compiling import compiled, inner, record_type, struct
+from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
+
+JOINT = record_type(
+    ("kind", "i8"),  # `JointKind`
+    ("parent", "i8"),
+    ("q_start", "i8"),  # first position
+    ("v_start", "i8"),  # first velocity
+    ("v_count", "i8"),  # number of velocities
+    ("mount", "f8", (12,)),  # pose in the parent at q = 0
+    ("axis", "f8", (3,)),
+    ("mass", "f8"),  # that the joint carries itself, kg
+    ("lever", "f8", (3,)),  # centre of mass of that in the joint, m
+)
+"""A joint of a robot."""
 
 
 @struct
@@ -24,12 +37,7 @@ class RobotArrays(NamedTuple):
         q: Joint positions, shape (nq,).
         is_current: Whether joint poses with Jacobians, the centre of mass, and
             Pinocchio's data belong to the present q, shape (3,).
-        kind: `JointKind` of each joint; then its parent, first position, first velocity
-            and number of velocities.
-        mount: Pose of each joint in its parent at q = 0, shape (njoints, 12).
-        axis: Axis of each joint, shape (njoints, 3).
-        mass: Mass that each joint carries itself, kg.
-        lever: Its centre of mass in the joint, m, shape (njoints, 3).
+        joints: `JOINT` records, shape (njoints,).
         pose: Pose of each joint in the world, shape (njoints, 12).
         jacobian: Joint Jacobians, shape (nv, 6).
         com: Centre of mass, m, shape (3,).
@@ -38,15 +46,7 @@ class RobotArrays(NamedTuple):
 
     q: Vector
     is_current: Indices
-    kind: Indices
-    parent: Indices
-    q_start: Indices
-    v_start: Indices
-    v_count: Indices
-    mount: Matrix
-    axis: Matrix
-    mass: Vector
-    lever: Matrix
+    joints: CompiledRecords
     pose: Matrix
     jacobian: Matrix
     com: Vector
@@ -58,18 +58,15 @@ class JointKind(IntEnum):
 
     OTHER = -1
     """Unknown to the kernels; Pinocchio computes models with such joints."""
-    REVOLUTE_X = 0
-    REVOLUTE_Y = 1
-    REVOLUTE_Z = 2
-    REVOLUTE = 3
-    PRISMATIC = 4
-    FREE = 5
+    REVOLUTE = 0
+    PRISMATIC = 1
+    FREE = 2
 
 
 _KINDS = {
-    "RX": (JointKind.REVOLUTE_X, (1.0, 0.0, 0.0)),
-    "RY": (JointKind.REVOLUTE_Y, (0.0, 1.0, 0.0)),
-    "RZ": (JointKind.REVOLUTE_Z, (0.0, 0.0, 1.0)),
+    "RX": (JointKind.REVOLUTE, (1.0, 0.0, 0.0)),
+    "RY": (JointKind.REVOLUTE, (0.0, 1.0, 0.0)),
+    "RZ": (JointKind.REVOLUTE, (0.0, 0.0, 1.0)),
     "PX": (JointKind.PRISMATIC, (1.0, 0.0, 0.0)),
     "PY": (JointKind.PRISMATIC, (0.0, 1.0, 0.0)),
     "PZ": (JointKind.PRISMATIC, (0.0, 0.0, 1.0)),
@@ -83,27 +80,24 @@ _KINDS = {
 def robot_arrays(model: pin.Model) -> RobotArrays:
     """Return the arrays of a model at its neutral configuration, not yet computed."""
     count, nv = int(model.njoints), int(model.nv)
-    kind = np.full(count, JointKind.OTHER, dtype=np.int64)
-    axis = np.zeros((count, 3))
-    for j, joint in enumerate(list(model.joints)[1:], start=1):
+    joints = np.zeros(count, JOINT)
+    joints["kind"], joints["parent"] = JointKind.OTHER, model.parents
+    joints["q_start"], joints["v_start"] = model.idx_qs, model.idx_vs
+    joints["v_count"] = model.nvs
+    joints["mount"] = [pack_pose(T) for T in model.jointPlacements]
+    joints["mass"] = [body.mass for body in model.inertias]
+    joints["lever"] = [body.lever for body in model.inertias]
+    for own, joint in zip(joints[1:], list(model.joints)[1:], strict=True):
         name = joint.shortname().removeprefix("JointModel")
         if name in _KINDS:
-            kind[j], fixed = _KINDS[name]
-            axis[j] = joint.extract().axis if fixed is None else fixed
+            own["kind"], axis = _KINDS[name]
+            own["axis"] = joint.extract().axis if axis is None else axis
     pose = np.zeros((count, 12))
     pose[0] = pack_pose(pin.SE3.Identity())
     return RobotArrays(
         q=pin.neutral(model),
         is_current=np.zeros(3, dtype=np.int64),
-        kind=kind,
-        parent=np.array(model.parents, dtype=np.int64),
-        q_start=np.array(model.idx_qs, dtype=np.int64),
-        v_start=np.array(model.idx_vs, dtype=np.int64),
-        v_count=np.array(model.nvs, dtype=np.int64),
-        mount=np.array([pack_pose(T) for T in model.jointPlacements]),
-        axis=axis,
-        mass=np.array([body.mass for body in model.inertias]),
-        lever=np.array([body.lever for body in model.inertias]),
+        joints=joints,
         pose=pose,
         jacobian=np.zeros((nv, 6)),
         com=np.zeros(3),
@@ -126,20 +120,20 @@ def compute_joint_poses(robot: RobotArrays) -> None:
     if robot.is_current[0]:
         return
     # Fields are read once: each access counts references.
-    kinds, poses, axes, parents = robot.kind, robot.pose, robot.axis, robot.parent
-    columns, q, mounts = robot.jacobian, robot.q, robot.mount
-    q_start, v_start = robot.q_start, robot.v_start
-    for j in range(1, kinds.shape[0]):
-        kind, T, k, column = kinds[j], poses[j], q_start[j], columns[v_start[j]]
-        multiply_poses(poses[parents[j]], mounts[j], T)
-        if kind == JointKind.FREE:
-            _move_freely(T, q[k:], columns[v_start[j] :])
-        elif kind == JointKind.PRISMATIC:
-            _shift(T, axes[j], float(q[k]), column)
-        elif kind == JointKind.REVOLUTE:
-            _turn(T, axes[j], float(q[k]), column)
+    joints, poses, columns, q = robot.joints, robot.pose, robot.jacobian, robot.q
+    mount = np.empty(12)
+    for j in range(1, joints.shape[0]):
+        joint, T = joints[j], poses[j]
+        k, i = joint.q_start, joint.v_start
+        for m in range(12):
+            mount[m] = joint.mount[m]
+        multiply_poses(poses[joint.parent], mount, T)
+        if joint.kind == JointKind.FREE:
+            _move_freely(T, q[k:], columns[i:])
+        elif joint.kind == JointKind.PRISMATIC:
+            _shift(T, joint.axis, float(q[k]), columns[i])
         else:
-            _turn_about(T, kind, float(q[k]), column)
+            _turn(T, joint.axis, float(q[k]), columns[i])
     robot.is_current[0] = 1
 
 
@@ -153,27 +147,29 @@ def compute_com(robot: RobotArrays) -> None:
     """
     if robot.is_current[1]:
         return
-    joints, parents, poses = robot.parent.shape[0], robot.parent, robot.pose
-    columns, com_columns = robot.jacobian, robot.com_jacobian
-    subtree = np.zeros((joints, 4))  # first moment and mass
-    for j in range(joints - 1, 0, -1):
-        T, m, lever = poses[j], robot.mass[j], robot.lever[j]
+    joints, count, poses = robot.joints, robot.joints.shape[0], robot.pose
+    columns, com_columns, com = robot.jacobian, robot.com_jacobian, robot.com
+    subtree = np.zeros((count, 4))  # first moment and mass
+    for j in range(count - 1, 0, -1):
+        joint, T = joints[j], poses[j]
+        m, lever, parent = joint.mass, joint.lever, joint.parent
         for i in range(3):
             along = T[i] * lever[0] + T[3 + i] * lever[1] + T[6 + i] * lever[2]
             subtree[j, i] += m * (T[9 + i] + along)
         subtree[j, 3] += m
         for i in range(4):
-            subtree[parents[j], i] += subtree[j, i]
+            subtree[parent, i] += subtree[j, i]
     scale = 1.0 / subtree[0, 3]
-    for j in range(1, joints):
-        x, y, z, m = subtree[j]
-        for k in range(robot.v_start[j], robot.v_start[j] + robot.v_count[j]):
+    for j in range(1, count):
+        x, y, z, m = subtree[j, 0], subtree[j, 1], subtree[j, 2], subtree[j, 3]
+        first = joints[j].v_start
+        for k in range(first, first + joints[j].v_count):
             v, out = columns[k], com_columns[k]
             out[0] = scale * (m * v[0] + v[4] * z - v[5] * y)
             out[1] = scale * (m * v[1] + v[5] * x - v[3] * z)
             out[2] = scale * (m * v[2] + v[3] * y - v[4] * x)
     for i in range(3):
-        robot.com[i] = scale * subtree[0, i]
+        com[i] = scale * subtree[0, i]
     robot.is_current[1] = 1
 
 
@@ -185,17 +181,6 @@ def multiply_poses(A: Vector, B: Vector, out: Vector) -> None:
         for j in range(3):
             out[3 * j + i] = a * B[3 * j] + b * B[3 * j + 1] + c * B[3 * j + 2]
         out[9 + i] = A[9 + i] + a * B[9] + b * B[10] + c * B[11]
-
-
-@inner
-def _turn_about(T: Vector, k: int, angle: float, column: Vector) -> None:
-    """Turn a pose about its own axis k, which mixes the two other columns."""
-    s, c = np.sin(angle), np.cos(angle)
-    a, b = 3 * ((k + 1) % 3), 3 * ((k + 2) % 3)
-    for i in range(3):
-        u, v = T[a + i], T[b + i]
-        T[a + i], T[b + i] = c * u + s * v, c * v - s * u
-    _write_revolute(T, T[3 * k], T[3 * k + 1], T[3 * k + 2], column)
 
 
 @inner

@@ -61,37 +61,38 @@ def compute_torques(
     Source: Featherstone (2008), "Rigid Body Dynamics Algorithms", section 5.3.
     """
     compute_joint_poses(robot)
-    parents, columns, count = robot.parent, robot.jacobian, robot.parent.shape[0]
+    joints, columns, count = robot.joints, robot.jacobian, robot.joints.shape[0]
     velocities, rates = inertias.velocity, inertias.acceleration
-    forces, starts, counts = inertias.force, robot.v_start, robot.v_count
+    forces = inertias.force
     for j in range(1, count):
-        velocity, rate = velocities[j], rates[j]
+        velocity, rate, joint = velocities[j], rates[j], joints[j]
+        first, end = joint.v_start, joint.v_start + joint.v_count
         for i in range(6):
-            velocity[i] = velocities[parents[j], i]
-            rate[i] = rates[parents[j], i]
-        for k in range(starts[j], starts[j] + counts[j]):
+            velocity[i] = velocities[joint.parent, i]
+            rate[i] = rates[joint.parent, i]
+        for k in range(first, end):
             for i in range(6):
                 velocity[i] += columns[k, i] * v[k]
                 rate[i] += columns[k, i] * a[k]
-        for k in range(starts[j], starts[j] + counts[j]):
+        for k in range(first, end):
             _add_rate_of_column(velocity, columns[k], float(v[k]), rate)
         _write_link_force(
             robot.pose[j],
-            float(robot.mass[j]),
-            robot.lever[j],
+            joint.mass,
+            joint.lever,
             inertias.inertia[j],
             velocity,
             rate,
             forces[j],
         )
     for j in range(count - 1, 0, -1):
-        force = forces[j]
-        for k in range(starts[j], starts[j] + counts[j]):
+        force, joint = forces[j], joints[j]
+        for k in range(joint.v_start, joint.v_start + joint.v_count):
             tau[k] = inertias.armature[k] * a[k]
             for i in range(6):
                 tau[k] += columns[k, i] * force[i]
         for i in range(6):
-            forces[parents[j], i] += force[i]
+            forces[joint.parent, i] += force[i]
 
 
 @inner

@@ -20,10 +20,10 @@ def integrate_joints(robot: RobotArrays, dq: Vector) -> None:
 @compiled
 def integrate(robot: RobotArrays, q: Vector, dq: Vector) -> None:
     """Move q in place: `q (+) dq`; the robot has no joint of kind `OTHER`."""
-    kinds, q_start, v_start = robot.kind, robot.q_start, robot.v_start
-    for j in range(1, kinds.shape[0]):
-        k, i = q_start[j], v_start[j]
-        if kinds[j] == JointKind.FREE:
+    joints = robot.joints
+    for j in range(1, joints.shape[0]):
+        k, i = joints[j].q_start, joints[j].v_start
+        if joints[j].kind == JointKind.FREE:
             _integrate_free(q[k:], dq[i:])
         else:
             q[k] += dq[i]
@@ -32,10 +32,10 @@ def integrate(robot: RobotArrays, q: Vector, dq: Vector) -> None:
 @compiled
 def difference(robot: RobotArrays, origin: Vector, q: Vector, out: Vector) -> None:
     """Write `q (-) origin`, shape (nv,); the robot has no joint of kind `OTHER`."""
-    kinds, q_start, v_start = robot.kind, robot.q_start, robot.v_start
-    for j in range(1, kinds.shape[0]):
-        k, i = q_start[j], v_start[j]
-        if kinds[j] == JointKind.FREE:
+    joints = robot.joints
+    for j in range(1, joints.shape[0]):
+        k, i = joints[j].q_start, joints[j].v_start
+        if joints[j].kind == JointKind.FREE:
             _free_difference(origin[k:], q[k:], out[i:])
         else:
             out[i] = q[k] - origin[k]

@@ -7,20 +7,17 @@ configuration.update(configuration.integrate(solution.dq))
 ```
 """
 
+from wbc_suite.compiling import record_type
 from wbc_suite.qp.com_task import ComTask
-from wbc_suite.qp.dynamics_space import Contact, MomentumTask
-from wbc_suite.qp.dynamics_stack import DynamicsSolution, DynamicsStack
 from wbc_suite.qp.equality import Equality, FrameEquality, LinearEquality
-from wbc_suite.qp.floor_limit import FloorLimit
 from wbc_suite.qp.frame_task import FrameTask, RelativeFrameTask
-from wbc_suite.qp.joint_coupling_task import JointCouplingTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
-from wbc_suite.qp.kernel import Kernel
+from wbc_suite.qp.joint_tasks import DampingTask, JointCouplingTask, PostureTask
 from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, LimitKind, RowLimit
 from wbc_suite.qp.look_at_task import LookAtTask
 from wbc_suite.qp.motion import Approach, Escaping, Motion, Overshoot, Relaxed
-from wbc_suite.qp.obstacle_limit import ObstacleLimit
-from wbc_suite.qp.posture_task import DampingTask, PostureTask
+from wbc_suite.qp.part import SharedRow
+from wbc_suite.qp.plane_limits import FloorLimit, ObstacleLimit
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.registry import LIMITS, TASKS, register_limit, register_task
 from wbc_suite.qp.report import (
@@ -34,6 +31,7 @@ from wbc_suite.qp.report import (
 )
 from wbc_suite.qp.self_collision_limit import LinkPair, SelfCollisionLimit
 from wbc_suite.qp.solution import Fallback, Solution
+from wbc_suite.qp.solver import make_solver
 from wbc_suite.qp.stack import TaskStack
 from wbc_suite.qp.standing_limits import Sole, SupportLimit, WeightLimit
 from wbc_suite.qp.task import JointTask, RowTask, Task
@@ -47,10 +45,7 @@ __all__ = [
     "BoxLimit",
     "ComTask",
     "Conflict",
-    "Contact",
     "DampingTask",
-    "DynamicsSolution",
-    "DynamicsStack",
     "Equality",
     "Escaping",
     "Fallback",
@@ -60,13 +55,11 @@ __all__ = [
     "JointBounds",
     "JointCouplingTask",
     "JointTask",
-    "Kernel",
     "Limit",
     "LimitKind",
     "LinearEquality",
     "LinkPair",
     "LookAtTask",
-    "MomentumTask",
     "Motion",
     "ObstacleLimit",
     "OutOfReach",
@@ -80,6 +73,7 @@ __all__ = [
     "RowLimit",
     "RowTask",
     "SelfCollisionLimit",
+    "SharedRow",
     "Sole",
     "Solution",
     "SupportLimit",
@@ -90,6 +84,8 @@ __all__ = [
     "TickRecord",
     "VelocityLimit",
     "WeightLimit",
+    "make_solver",
+    "record_type",
     "register_limit",
     "register_task",
 ]

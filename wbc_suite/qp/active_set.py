@@ -136,8 +136,7 @@ def solve_warm(qp: QpArrays) -> bool:
         cholesky(system, size, _DEPENDENT)
         solve_lower(system, y, size)
         solve_upper(system, y, size)
-        _recover(qp, size)
-        changed = _deactivate(qp)
+        changed = _recover(qp, size)
         if not _activate(qp, count >= _QUICK) and not changed:
             return True
     side[:] = 0
@@ -193,9 +192,14 @@ def _state_system(qp: QpArrays) -> int:
 
 
 @inner
-def _recover(qp: QpArrays, size: int) -> None:
-    """Write x and the multipliers from the solution of the small system."""
-    n, m = qp.x.shape[0], qp.e.shape[0]
+def _recover(qp: QpArrays, size: int) -> bool:  # noqa: C901, one pass
+    """Write x and the multipliers from the solution of the small system.
+
+    Make inactive what has a multiplier of the wrong sign; return if there is any.
+    """
+    n, m, changed = qp.x.shape[0], qp.e.shape[0], False
+    lower, upper, wanted, weight = qp.lower, qp.upper, qp.wanted, qp.weight[0]
+    root, kept, diagonal, mu = qp.root, qp.kept, qp.diagonal, qp.mu[0]
     x, multipliers, side, last = qp.x, qp.multipliers, qp.side, qp.last
     W, rows, all_scaled = qp.W, qp.rows, qp.scaled
     multipliers[:] = 0.0
@@ -209,23 +213,13 @@ def _recover(qp: QpArrays, size: int) -> None:
             multipliers[i] -= own[i] * y
     for i in range(n):
         if side[i] == 0:
-            x[i] *= qp.root[i]
+            x[i] *= root[i]
             multipliers[i] = 0.0
         else:
-            x[i] = qp.kept[i]
-            weight = qp.diagonal[0, i] + qp.mu[0]
-            multipliers[i] += qp.diagonal[1, i] - weight * x[i]
-
-
-@inner
-def _deactivate(qp: QpArrays) -> bool:
-    """Make inactive what has a multiplier of the wrong sign; return if there is any."""
-    n, changed, side, multipliers = qp.x.shape[0], False, qp.side, qp.multipliers
-    lower, upper, wanted, weight = qp.lower, qp.upper, qp.wanted, qp.weight[0]
-    for i in range(n):
-        wrong = multipliers[i] * side[i] < 0.0
-        if wrong and lower[i] < upper[i]:
-            side[i], changed = 0, True
+            x[i] = kept[i]
+            multipliers[i] += diagonal[1, i] - (diagonal[0, i] + mu) * x[i]
+            if multipliers[i] * side[i] < 0.0 and lower[i] < upper[i]:
+                side[i], changed = 0, True
     for row in range(qp.counts[0]):
         force, state = multipliers[n + row], side[n + row]
         if state != 0 and force < 0.0:
@@ -237,8 +231,8 @@ def _deactivate(qp: QpArrays) -> bool:
     return changed
 
 
-@compiled
-def _activate(qp: QpArrays, only_one: bool) -> bool:  # noqa: C901, one search
+@inner
+def _activate(qp: QpArrays, only_one: bool) -> bool:
     """Make active what is violated, or the worst of it; return if there is any.
 
     Clips what is violated by rounding.
@@ -246,30 +240,25 @@ def _activate(qp: QpArrays, only_one: bool) -> bool:  # noqa: C901, one search
     n, found, worst, state = qp.x.shape[0], -1, 0.0, 0
     x, side, lower, upper = qp.x, qp.side, qp.lower, qp.upper
     wanted, rows = qp.wanted, qp.rows
-    for i in range(n):
-        over, under = x[i] - upper[i], lower[i] - x[i]
-        violation = over if over > under else under
-        if violation <= _TOLERANCE:  # False for what is not a number
-            x[i] = min(max(x[i], lower[i]), upper[i])
-            continue
-        new = 1 if over > under else -1
+    for i in range(n + qp.counts[0]):
+        if i < n:
+            over, under = x[i] - upper[i], lower[i] - x[i]
+            violation, new = (over, 1) if over > under else (under, -1)
+            if violation <= _TOLERANCE:  # False for what is not a number
+                x[i] = min(max(x[i], lower[i]), upper[i])
+                continue
+        else:
+            soft = wanted[i - n] < upper[i] and side[i] == 0
+            bound, new = (wanted[i - n], _SOFT) if soft else (upper[i], _HARD)
+            if side[i] == _HARD:
+                continue
+            violation = dot(rows[i - n], x, n) - bound
+            if violation <= _ROW_TOLERANCE:
+                continue
         if not only_one:
             side[i] = new
         if found < 0 or violation > worst:
             found, worst, state = i, violation, new
-    for row in range(qp.counts[0]):
-        if side[n + row] == _HARD:
-            continue
-        bound = upper[n + row]
-        soft = wanted[row] < bound and side[n + row] == 0
-        violation = dot(rows[row], x, n) - (wanted[row] if soft else bound)
-        if violation <= _ROW_TOLERANCE:
-            continue
-        new = _SOFT if soft else _HARD
-        if not only_one:
-            side[n + row] = new
-        if found < 0 or violation > worst:
-            found, worst, state = n + row, violation, new
     if only_one and found >= 0:
         side[found] = state
     return found >= 0

@@ -1,14 +1,29 @@
 """Bring the centre of mass to a point."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import pinocchio as pin
 
 from wbc_suite.arguments import check_array
+from wbc_suite.compiling import inner
 from wbc_suite.kinematics import Configuration
-from wbc_suite.kinematics.forward import compute_joint_poses
-from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.task import RowTask, SharedRow
-from wbc_suite.qp.task_kernels import com_error
+from wbc_suite.kinematics.forward import RobotArrays, compute_com
+from wbc_suite.qp.part import SharedRow
+from wbc_suite.qp.task import RowTask
 from wbc_suite.typing import Matrix, Vector
+
+
+@inner
+def com_error(
+    robot: RobotArrays, own: Vector, dt: float, rows: Matrix, values: Vector
+) -> None:
+    """Write Jacobian and error of the centre of mass; own is the point."""
+    compute_com(robot)
+    com, columns = robot.com, robot.com_jacobian
+    for i in range(3):
+        for j in range(rows.shape[1]):
+            rows[i, j] = columns[j, i]
+        values[i] = own[i] - com[i]
 
 
 class ComTask(RowTask):
@@ -21,7 +36,7 @@ class ComTask(RowTask):
     Other arguments are those of `RowTask`.
     """
 
-    kernel: ClassVar[Kernel] = Kernel.COM
+    kernel: ClassVar[Any] = com_error
 
     def __init__(
         self,
@@ -53,11 +68,5 @@ class ComTask(RowTask):
     def bind(self, configuration: Configuration) -> None:
         """Without a target, hold the present point."""
         if not self.target_row.is_set:
-            self.set_target(configuration.com)
-
-    def evaluate(
-        self, configuration: Configuration, error: Vector, jacobian: Matrix
-    ) -> None:
-        """Write the error, m, and its Jacobian."""
-        compute_joint_poses(configuration.robot)
-        com_error(configuration.robot, self.target_row.values, error, jacobian)
+            model, data = configuration.model, configuration.data
+            self.set_target(pin.centerOfMass(model, data, configuration.q).copy())

@@ -7,41 +7,33 @@ from typing import TypeVar, cast
 
 import numpy as np
 
-from wbc_suite.compiling import as_argument
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.active_set import QpArrays
-from wbc_suite.qp.equality import Equality, FrameEquality, HeldFrames, LinearEquality
-from wbc_suite.qp.floor_limit import FloorLimit
-from wbc_suite.qp.kernel import Kernel, kernel_of
+from wbc_suite.qp.equality import Equality, LinearEquality
 from wbc_suite.qp.limit import Limit, LimitKind, RowLimit
-from wbc_suite.qp.obstacle_limit import ObstacleLimit
-from wbc_suite.qp.self_collision_limit import SelfCollisionLimit
-from wbc_suite.qp.strict_level import MAX_LEVELS
+from wbc_suite.qp.part import (
+    MAX_LEVELS,
+    MOST_LIMITS,
+    PART,
+    Kernels,
+    Numbers,
+    kernel_of,
+)
 from wbc_suite.qp.task import RowTask, Task
-from wbc_suite.typing import Indices, Vector
+from wbc_suite.typing import Records, Vector
 
 
 class Constraints:
     """Inequality rows, then equality rows, in the order in which a problem has them.
 
-    The first limits of self-collision, floor and obstacles and the equalities of this
-    package are written by kernels; others by their own `rows` before each tick. All are
+    Parts without a kernel are evaluated by their own `rows` before each tick. All are
     bound here. Limits without rows are left out.
 
     Attributes:
         inequalities: Number of inequality rows.
         equalities: Number of equality rows.
         names: Name and number of rows of each equality.
-        relax_speed: `RowLimit.relax_speed` of each inequality row.
-        rate: Right-hand side per second of constant equality rows, NaN for others.
-        held: Frames of the equality rows, for `hold_frames`.
-        collision: The self-collision limit that a kernel writes.
-        collision_rows: Its first inequality row and the end.
-        floor: The floor limit that a kernel writes.
-        floor_rows: Its first inequality row and the end.
-        obstacles: The obstacle limit that a kernel writes.
-        obstacle_rows: Its first inequality row and the end.
         python_parts: Limits and equalities whose rows no kernel writes.
     """
 
@@ -57,64 +49,51 @@ class Constraints:
         self._limits, self.inequalities = with_rows(row_limits)
         self._equalities, self.equalities = with_rows(equalities)
         self.names = tuple((x.name, x.dim) for x in equalities)
-        speeds = [limit.relax_speed for limit in row_limits for _ in range(limit.dim)]
-        self.relax_speed: Vector = np.array(speeds, dtype=np.float64)
         self._python_limits: list[tuple[RowLimit, slice]] = []
         self._python_equalities: list[tuple[Equality, slice]] = []
-        self._bind_limits(configuration)
-        self._bind_equalities(configuration)
-        slow = *self._python_limits, *self._python_equalities
-        self.python_parts = [part for part, _ in slow]
 
-    def _bind_limits(self, configuration: Configuration) -> None:
-        """Choose what kernels write; limits without capsules and spheres write none."""
-        self.collision, self.floor = SelfCollisionLimit((), ()), FloorLimit({})
-        self.collision_rows: Indices = np.zeros(2, dtype=np.int64)
-        self.floor_rows: Indices = np.zeros(2, dtype=np.int64)
-        self.obstacles = ObstacleLimit((), ())
-        self.obstacle_rows: Indices = np.zeros(2, dtype=np.int64)
-        for limit, rows in self._limits:
-            kernel, end = kernel_of(limit), (rows.start, rows.stop)
-            is_first = not self.collision_rows.any()
-            if isinstance(limit, SelfCollisionLimit) and kernel and is_first:
-                self.collision, self.collision_rows[:] = limit, end
-            elif isinstance(limit, FloorLimit) and kernel and not self.floor_rows.any():
-                self.floor, self.floor_rows[:] = limit, end
-            elif (
-                isinstance(limit, ObstacleLimit)
-                and kernel
-                and not self.obstacle_rows.any()
-            ):
-                self.obstacles, self.obstacle_rows[:] = limit, end
+    @property
+    def python_parts(self) -> list[RowLimit | Equality]:
+        """Limits and equalities whose rows no kernel writes."""
+        slow = *self._python_limits, *self._python_equalities
+        return [part for part, _ in slow]
+
+    def records(
+        self, configuration: Configuration, kernels: Kernels, numbers: Numbers
+    ) -> tuple[Records, list[Vector]]:
+        """Return `PART` records, and the numbers of all parts with a kernel.
+
+        The first are those of tasks and equalities; limits follow.
+        """
+        records = np.zeros(len(self._limits) + len(self._equalities), PART)
+        own = [numbers.values]
+        for record, (limit, rows) in zip(records, self._limits, strict=False):
+            record["row"], record["end"] = rows.start, rows.stop
+            record["relax_speed"] = limit.relax_speed
+            kernel = kernel_of(limit) if len(own) < MOST_LIMITS else None
+            record["kernel"], has_room = kernels.place(kernel)
+            if has_room:
+                record["own"] = len(own)
+                own.append(limit.own(configuration))
+                record["last"] = len(own[-1])
             else:
                 self._python_limits.append((limit, rows))
-        self.collision.bind(configuration)
-        self.floor.bind(configuration)
-        self.obstacles.bind(configuration)
-
-    def _bind_equalities(self, configuration: Configuration) -> None:
-        self.rate: Vector = np.full(self.equalities, np.nan)
-        self._constant: list[tuple[LinearEquality, slice]] = []
-        frames: list[tuple[FrameEquality, int]] = []
-        for equality, rows in self._equalities:
-            kernel = kernel_of(equality)
-            if isinstance(equality, FrameEquality) and kernel is Kernel.FRAME:
-                frames.append((equality, rows.start))
-            elif isinstance(equality, LinearEquality) and kernel is Kernel.CONSTANT:
-                self._constant.append((equality, rows))
-                self.rate[rows] = equality.rate
-            else:
+        rest = records[len(self._limits) :]
+        for record, (equality, rows) in zip(rest, self._equalities, strict=True):
+            record["row"] = self.inequalities + rows.start
+            record["end"] = self.inequalities + rows.stop
+            record["relax_speed"] = np.nan
+            record["first"], record["last"] = numbers.of(equality)
+            record["kernel"], has_room = kernels.place(kernel_of(equality))
+            if not has_room:
                 self._python_equalities.append((equality, rows))
-        held = self.held_arrays = HeldFrames.of(configuration, frames)
-        self.held = as_argument(held)
-        self._targets = list(held.target)  # copies live as long as these views
-        for (equality, _), target in zip(frames, self._targets, strict=True):
-            equality.target_row.attach(target)
+        return records, own + [np.zeros(0)] * (MOST_LIMITS - len(own))
 
     def fill_constants(self, qp: QpArrays) -> None:
         """Write the rows that never change."""
-        for equality, rows in self._constant:
-            qp.rows[self.inequalities :][rows] = equality.matrix
+        for equality, rows in self._equalities:
+            if isinstance(equality, LinearEquality):
+                qp.rows[self.inequalities :][rows] = equality.matrix
 
     def prepare(self, configuration: Configuration, dt: float, qp: QpArrays) -> None:
         """Write the rows that have no kernel."""

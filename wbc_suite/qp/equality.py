@@ -1,28 +1,20 @@
 """Rows that a solution keeps exactly: feet that must not move, wheels that roll."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_array, check_number
-from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.compiling import inner, record_type
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.kinematics.forward import (
-    RobotArrays,
-    compute_joint_poses,
-    multiply_poses,
-    pack_pose,
-)
-from wbc_suite.qp.frame_task import homogeneous
-from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.lie import log3, saturate
-from wbc_suite.qp.task import SharedRow
-from wbc_suite.qp.task_kernels import relative_rotation
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.kinematics.forward import RobotArrays, pack_pose
+from wbc_suite.qp.frame_task import homogeneous, relative_rotation
+from wbc_suite.qp.lie import is_usable, log3, saturate
+from wbc_suite.qp.part import SharedRow, place_frame, run_kernel
+from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
 
 Direction = Literal["x", "y", "z", "roll", "pitch", "yaw"]
 _DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -30,24 +22,99 @@ _RETURN_SPEED = 0.5  # m/s, of a frame that has drifted
 _RETURN_ANGULAR_SPEED = 1.0  # rad/s
 
 
-class Equality(ABC):
+HELD = record_type(
+    ("joint", "i8"),  # parent joint of the frame
+    ("offset", "f8", (12,)),  # its pose in the joint, [R p] by columns
+    ("gain", "f8"),  # fraction of the drift that one step removes; 0 removes none
+    ("directions", "i8", (6,)),  # local direction of each row
+    ("target", "f8", (12,)),  # pose to hold, [R p] row by row
+)
+"""Numbers of a frame that is held."""
+
+
+@inner
+def hold_frame(
+    robot: RobotArrays, own: Vector, dt: float, rows: Matrix, values: Vector
+) -> None:
+    """Write the kept rows of `J_local dq = gain e`, see `FrameEquality`."""
+    T, error, held = np.empty(12), np.empty(6), own.view(HELD)[0]
+    drift(robot, held, T, error)
+    finite, gain = True, held.gain
+    columns, joints = robot.jacobian, robot.joints
+    for i in range(6):
+        error[i] *= gain
+        finite &= bool(np.isfinite(error[i]))
+    saturate(error[:3], _RETURN_SPEED * dt)
+    saturate(error[3:], _RETURN_ANGULAR_SPEED * dt)
+    for row in range(values.shape[0]):
+        direction, j = held.directions[row], held.joint
+        values[row] = error[direction] if finite and gain > 0.0 else 0.0
+        k = 3 * (direction % 3)
+        x, y, z = T[k], T[k + 1], T[k + 2]
+        while j > 0:
+            joint = joints[j]
+            for col in range(joint.v_start, joint.v_start + joint.v_count):
+                J = columns[col]
+                if direction >= 3:
+                    speed = x * J[3] + y * J[4] + z * J[5]
+                else:
+                    speed = x * (J[0] + J[4] * T[11] - J[5] * T[10])
+                    speed += y * (J[1] + J[5] * T[9] - J[3] * T[11])
+                    speed += z * (J[2] + J[3] * T[10] - J[4] * T[9])
+                rows[row, col] = speed
+            j = joint.parent
+
+
+@inner
+def drift(robot: RobotArrays, held: CompiledRecords, T: Vector, error: Vector) -> None:
+    """Write the pose of a frame, and its drift in the frame's axes, shape (6,)."""
+    target, E = held.target, np.empty((3, 3))
+    place_frame(robot, held.joint, held.offset, T)
+    finite = relative_rotation(T, target, E)
+    log3(E, error[3:])
+    for i in range(3):
+        error[i] = 0.0
+        for j in range(3):
+            error[i] += T[3 * i + j] * (target[4 * j + 3] - T[9 + j])
+    if not finite:
+        error[:] = np.nan
+
+
+@inner
+def scale_rate(
+    robot: RobotArrays, own: Vector, dt: float, rows: Matrix, values: Vector
+) -> None:
+    """Write `b = rate dt`; own is the rate. The rows are constant."""
+    for row in range(values.shape[0]):
+        values[row] = own[row] * dt
+
+
+class Equality:
     """Rows `A dq = b`, prior to every task: `dim` of them, which reports call `name`.
 
-    What writes them is inherited with `rows`, see `kernel_of`.
+    A subclass writes `rows`, or names a `kernel` and its numbers, see `part`.
     """
 
-    kernel: ClassVar[Kernel] = Kernel.PYTHON
+    kernel: ClassVar[Any] = None
     name: str
     dim: int
+    target_row: SharedRow = SharedRow(0)
 
-    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
+    def bind(self, configuration: Configuration) -> None:
         """Resolve names in a model."""
 
-    @abstractmethod
+    def own(self, configuration: Configuration) -> Vector:
+        """Return the numbers that the kernel reads; they end with `target_row`."""
+        return self.target_row.values.copy()
+
     def rows(
         self, configuration: Configuration, dt: float, A: Matrix, b: Vector
     ) -> None:
-        """Write A, shape (dim, nv), and b, shape (dim,)."""
+        """Write A, shape (dim, nv), and b, shape (dim,).
+
+        A is zero before the first call.
+        """
+        run_kernel(self, configuration.robot, self.own(configuration), dt, A, b)
 
 
 class FrameEquality(Equality):
@@ -69,7 +136,7 @@ class FrameEquality(Equality):
         UnknownNameError: If a direction is unknown.
     """
 
-    kernel: ClassVar[Kernel] = Kernel.FRAME
+    kernel: ClassVar[Any] = hold_frame
 
     def __init__(
         self,
@@ -90,7 +157,7 @@ class FrameEquality(Equality):
         self.gain = check_number(what, gain, above=0.0, most=1.0)
         self.name, self.frame = name or frame, frame
         self.hold_pose = hold_pose
-        kept = [_DIRECTIONS.index(direction) for direction in directions]
+        kept = [_DIRECTIONS.index(direction) for direction in dict.fromkeys(directions)]
         self.directions: Indices = np.array(kept, dtype=np.int64)
         self.dim = len(kept)
         self.target_row = SharedRow(12)
@@ -106,20 +173,25 @@ class FrameEquality(Equality):
         if not self.target_row.is_set:
             self.set_target(configuration.frame_pose(self.frame))
 
-    def rows(
-        self, configuration: Configuration, dt: float, A: Matrix, b: Vector
-    ) -> None:
-        """Write the kept rows of `J_local dq = gain e`."""
-        compute_joint_poses(configuration.robot)
-        held = as_argument(HeldFrames.of(configuration, [(self, 0)]))
-        hold_frames(configuration.robot, held, dt, A, b)
+    def own(self, configuration: Configuration) -> Vector:
+        """Return a `HELD` record."""
+        frame = configuration.model.frames[configuration.frame_id(self.frame)]
+        held = np.zeros(1, HELD)
+        held["joint"], held["offset"] = frame.parentJoint, pack_pose(frame.placement)
+        held["gain"] = self.gain if self.hold_pose else 0.0
+        held["directions"][0, : self.dim] = self.directions
+        held["target"] = self.target_row.values
+        return held.view(np.float64)
 
     def error(self, configuration: Configuration) -> Vector:
         """Return the drift e, m and rad in the frame's axes, shape (6,)."""
-        compute_joint_poses(configuration.robot)
-        held, error = HeldFrames.of(configuration, [(self, 0)]), np.empty(6)
-        _drift(configuration.robot, as_argument(held), 0, np.empty(12), error)
-        return error
+        pose = configuration.frame_pose(self.frame)
+        T = self.target_row.values.reshape(3, 4)
+        if not is_usable(T):
+            return np.full(6, np.nan)
+        R = pose.rotation.T
+        turn = pin.log3(R @ T[:, :3])
+        return np.concatenate([R @ (T[:, 3] - pose.translation), turn])
 
 
 class LinearEquality(Equality):
@@ -133,7 +205,7 @@ class LinearEquality(Equality):
         ConfigError: If shapes differ or a value is not finite.
     """
 
-    kernel: ClassVar[Kernel] = Kernel.CONSTANT
+    kernel: ClassVar[Any] = scale_rate
 
     def __init__(
         self, matrix: Matrix, *, rate: Vector | None = None, name: str = "equality"
@@ -166,88 +238,6 @@ class LinearEquality(Equality):
         A[:] = self.matrix
         np.multiply(self.rate, dt, out=b)
 
-
-@struct
-class HeldFrames(NamedTuple):
-    """Frames that `hold_frames` holds: n of them, with m rows."""
-
-    joint: Indices  # (n,), parent joint of each frame
-    offset: Matrix  # (n, 12), pose of the frame in its joint, by columns
-    moves: Matrix  # (n, nv), 1 where a velocity moves the frame, else 0
-    target: Matrix  # (n, 12), pose to hold, [R p] row by row
-    gain: Vector  # (n,), fraction of the drift that one step removes; 0 removes none
-    directions: Indices  # (m,), local direction of each row
-    row_start: Indices  # (n + 1,), first entry of each frame in `directions`, and m
-    row: Indices  # (m,), row of the problem of each entry of `directions`
-
-    @classmethod
-    def of(
-        cls, configuration: Configuration, held: Sequence[tuple[FrameEquality, int]]
-    ) -> "HeldFrames":
-        """Return the arrays of some equalities, each with its first row."""
-        model, count = configuration.model, len(held)
-        frames = [model.frames[configuration.frame_id(x.frame)] for x, _ in held]
-        moves = np.zeros((count, configuration.nv))
-        for k, frame in enumerate(frames):
-            moves[k, configuration.joint_support(frame.parentJoint)] = 1.0
-        none = [np.zeros(0, dtype=np.int64)]
-        rows = [row + np.arange(x.dim, dtype=np.int64) for x, row in held]
-        return cls(
-            joint=np.array([f.parentJoint for f in frames], dtype=np.int64),
-            offset=np.reshape([pack_pose(f.placement) for f in frames], (count, 12)),
-            moves=moves,
-            target=np.reshape([x.target_row.values for x, _ in held], (count, 12)),
-            gain=np.array([x.gain if x.hold_pose else 0.0 for x, _ in held]),
-            directions=np.concatenate([*none, *(x.directions for x, _ in held)]),
-            row_start=np.cumsum([0, *(x.dim for x, _ in held)], dtype=np.int64),
-            row=np.concatenate([*none, *rows]),
-        )
-
-
-@compiled
-def hold_frames(
-    robot: RobotArrays, held: HeldFrames, dt: float, A: Matrix, b: Vector
-) -> None:
-    """Write the kept rows of `J_local dq = gain e`, see `FrameEquality`.
-
-    Joint poses are current; A and b are all equality rows of the problem.
-    """
-    T, error = np.empty(12), np.empty(6)
-    for t in range(held.joint.shape[0]):
-        _drift(robot, held, t, T, error)
-        finite = True
-        for i in range(6):
-            error[i] *= held.gain[t]
-            finite &= bool(np.isfinite(error[i]))
-        saturate(error[:3], _RETURN_SPEED * dt)
-        saturate(error[3:], _RETURN_ANGULAR_SPEED * dt)
-        for k in range(held.row_start[t], held.row_start[t + 1]):
-            row, direction = held.row[k], held.directions[k]
-            b[row] = error[direction] if finite and held.gain[t] > 0.0 else 0.0
-            a = T[3 * (direction % 3) : 3 * (direction % 3) + 3]
-            for col in range(A.shape[1]):
-                J, speed = robot.jacobian[col], 0.0
-                if direction >= 3:
-                    speed = a[0] * J[3] + a[1] * J[4] + a[2] * J[5]
-                else:
-                    speed += a[0] * (J[0] + J[4] * T[11] - J[5] * T[10])
-                    speed += a[1] * (J[1] + J[5] * T[9] - J[3] * T[11])
-                    speed += a[2] * (J[2] + J[3] * T[10] - J[4] * T[9])
-                A[row, col] = held.moves[t, col] * speed
-
-
-@compiled
-def _drift(
-    robot: RobotArrays, held: HeldFrames, t: int, T: Vector, error: Vector
-) -> None:
-    """Write the pose of a frame, and its drift in the frame's axes, shape (6,)."""
-    target, E = held.target[t], np.empty((3, 3))
-    multiply_poses(robot.pose[held.joint[t]], held.offset[t], T)
-    finite = relative_rotation(T, target, E)
-    log3(E, error[3:])
-    for i in range(3):
-        error[i] = 0.0
-        for j in range(3):
-            error[i] += T[3 * i + j] * (target[4 * j + 3] - T[9 + j])
-    if not finite:
-        error[:] = np.nan
+    def own(self, configuration: Configuration) -> Vector:
+        """Return the rate."""
+        return self.rate.copy()

@@ -74,7 +74,7 @@ class Escape:
         self._range = self._bounds.q_upper - self._bounds.q_lower
         limited = np.isfinite(self._range) & (self._bounds.q_index >= 0)
         self._limited = np.flatnonzero(limited)
-        self._supports = [t.support(self._configuration) for t in self._tasks]
+        self._supports = [self._configuration.support(t.frame) for t in self._tasks]
         self.reset()
 
     def reset(self) -> None:
@@ -94,7 +94,7 @@ class Escape:
         """Write the bias of the next tick to the tasks of the stack's first level."""
         v = self._stack.v_previous
         self._still = self._still + dt if max(v.max(), -v.min()) < _STILL else 0.0
-        self._stack.levels[0].tasks.bias[:] = 0.0
+        self._stack.levels[0].arrays.bias[:] = 0.0
         if self._drive is None and self._search is None:
             if self._still < _STANDING_TIME or not self._is_stuck():
                 return
@@ -134,7 +134,7 @@ class Escape:
                 self._push(drive, copy, _STEP)
                 robot.update(robot.integrate(copy.solve(_STEP).dq))
                 yield
-            copy.levels[0].tasks.bias[:] = 0.0
+            copy.levels[0].arrays.bias[:] = 0.0
             for _ in range(round(_SETTLE_TIME / _STEP)):
                 robot.update(robot.integrate(copy.solve(_STEP).dq))
                 yield
@@ -149,7 +149,7 @@ class Escape:
 
     def _push(self, drive: _Drive, stack: Stack, dt: float) -> None:
         """Write the bias of a drive: squared costs and weighted steps."""
-        joints, bias = drive.joints, stack.levels[0].tasks.bias
+        joints, bias = drive.joints, stack.levels[0].arrays.bias
         cost = _DRIVE_COST * max(float(t.cost.max()) for t in self._tasks)
         speed = np.minimum(self._bounds.v_max[joints], 3.0) * _DRIVE_SPEED * dt
         step = np.clip(self._to_middle(joints, stack), -speed, speed)

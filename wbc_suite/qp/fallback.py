@@ -12,7 +12,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc_suite.compiling import as_argument, compiled
 from wbc_suite.qp.level import Level
 from wbc_suite.qp.limit import merge_bounds
 from wbc_suite.qp.problem import UNBOUNDED, Problem, clip_step
@@ -31,7 +30,7 @@ class LevelSolver:
 
     The levels are as `solve_tick` has stated them at the positions q. The solver is for
     the first level; a fresh one of its kind is made for each size of problem below.
-    `overshoot_damping`, shape (1,), also damps relaxed rows; see `overshoot`.
+    Damping of overshoot also damps relaxed rows.
     """
 
     def __init__(
@@ -40,13 +39,9 @@ class LevelSolver:
         levels: Sequence[Level],
         tick: TickArrays,
         solver: QpSolver,
-        overshoot_damping: Vector,
     ) -> None:
         self._q, self._levels, self._tick, self.solver = q, levels, tick, solver
-        self._overshoot_damping = overshoot_damping
         self._problems: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
-        zero = np.zeros(1)
-        box_least_squares(np.eye(1), zero, zero, zero, 1)  # compiled before a tick
 
     def reset(self) -> None:
         """Discard all warm starts."""
@@ -67,9 +62,9 @@ class LevelSolver:
             result = checked_solve(solver, problem)
             result = result or checked_solve(DaqpSolver(), problem)
         if result is None:
-            problem.weight = RETURN_WEIGHT * stiffness(level.arrays.tasks)
+            problem.weight = RETURN_WEIGHT * stiffness(level.qp)
             if is_finite:
-                damping = float(self._overshoot_damping[0])
+                damping = float(self._tick.parts.state["overshoot_damping"][0])
                 *result, fallback = solve_relaxed(problem, damping=damping)
             else:
                 lb, ub = self._bounds_without_acceleration(dt)
@@ -81,8 +76,9 @@ class LevelSolver:
     def _bounds_without_acceleration(self, dt: float) -> tuple[Vector, Vector]:
         """Return the bounds of a step that may change speeds at once, shape (nv,)."""
         tick, lower, upper = self._tick, *np.empty((2, len(self._tick.v)))
-        bounds = tick.bounds._replace(a_max=np.full(len(lower), np.inf))
-        merge_bounds(as_argument(bounds), self._q, tick.v, dt, lower, upper, tick.kinds)
+        bounds = tick.bounds.copy()
+        bounds["a_max"] = np.inf
+        merge_bounds(bounds, self._q, tick.v, dt, lower, upper, tick.kinds)
         return lower, upper
 
     def _solve_lower(self, k: int) -> Fallback:
@@ -141,7 +137,7 @@ def solve_relaxed(
     """Return step, multipliers and fallback for a problem that has no solution.
 
     Daqp solves them, whichever solver failed: others take milliseconds for each.
-    `damping` is added to that of relaxed rows, m^2/rad^2; see `overshoot`.
+    `damping` is added to that of relaxed rows, m^2/rad^2; see `tick`.
     """
     if result := checked_solve(DaqpSolver(), _loosened(problem.copy())):
         return *result, Fallback.LIMITS
@@ -167,7 +163,7 @@ def _solve_with_slack(problem: Problem, damping: float) -> tuple[Vector, Vector]
     """Solve with equality rows as heavy tasks and slack s >= 0 on `G dq <= h + s`.
 
     Rows that cannot be kept have a residual, so what damps unreachable tasks is needed
-    here too, see `task_kernels.write_tasks`: without it a robot whose feet and links
+    here too, see `task_rows.write_tasks`: without it a robot whose feet and links
     contradict each other was measured to swing at full speed, 9.6 rad/s between ticks.
     """
     relaxed = _loosened(problem.copy(equalities=False))
@@ -184,7 +180,6 @@ def _solve_with_slack(problem: Problem, damping: float) -> tuple[Vector, Vector]
     return x, np.concatenate([multipliers, weight * (A @ x - b)])
 
 
-@compiled
 def box_least_squares(
     H: Matrix, c: Vector, lb: Vector, ub: Vector, sweeps: int
 ) -> Vector:
@@ -193,12 +188,12 @@ def box_least_squares(
     Needs no factorisation and cannot fail: every sweep lowers the cost and stays in the
     box. Source: projected Gauss-Seidel, Bertsekas (1999), "Nonlinear Programming", 2.7.
     """
-    n = c.shape[0]
-    x = np.minimum(np.maximum(np.zeros(n), lb), ub)
+    x = np.clip(np.zeros(len(c)), lb, ub)
     for _ in range(sweeps):
-        for i in range(n):
-            gradient = c[i]
-            for j in range(n):
-                gradient += H[i, j] * x[j]
-            x[i] = min(max(x[i] - gradient / H[i, i], lb[i]), ub[i])
+        before = x.copy()
+        for i in range(len(c)):
+            step = (c[i] + H[i] @ x) / H[i, i]
+            x[i] = min(max(x[i] - step, lb[i]), ub[i])
+        if np.array_equal(x, before):
+            break
     return x

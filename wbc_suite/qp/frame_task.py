@@ -1,19 +1,80 @@
 """Bring a frame to a pose, in the world or relative to another frame."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_array
+from wbc_suite.compiling import inner, record_type
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.kinematics.forward import compute_joint_poses, pack_pose
-from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.lie import is_usable
-from wbc_suite.qp.task import RowTask, SharedRow, cost_vector
-from wbc_suite.qp.task_kernels import frame_error
+from wbc_suite.kinematics.forward import RobotArrays, pack_pose
+from wbc_suite.qp.lie import LARGEST_FINITE, inverse_left_jacobian, is_usable, log3
+from wbc_suite.qp.part import SharedRow, place_frame
+from wbc_suite.qp.task import RowTask, cost_vector
 from wbc_suite.typing import Indices, Matrix, Vector
+
+FRAME = record_type(
+    ("joint", "i8"),  # parent joint of the frame
+    ("offset", "f8", (12,)),  # its pose in the joint, [R p] by columns
+    ("target", "f8", (12,)),  # target pose, [R p] row by row
+)
+"""Numbers of a frame that has a target."""
+
+
+@inner
+def frame_error(
+    robot: RobotArrays, own: Vector, dt: float, rows: Matrix, values: Vector
+) -> None:
+    """Write Jacobian and error of a frame; see `FrameTask` for the equations.
+
+    For a target that is not finite the error is NaN, and the Jacobian that of no
+    rotation.
+    """
+    frame, T = own.view(FRAME)[0], np.empty(12)
+    E, A, target, error = np.empty((3, 3)), np.empty((3, 3)), frame.target, values
+    place_frame(robot, frame.joint, frame.offset, T)
+    finite = relative_rotation(T, target, E)
+    rotation = error[3:]
+    angle = log3(E, rotation)
+    inverse_left_jacobian(rotation, angle, E)
+    for i in range(3):
+        error[i] = target[4 * i + 3] - T[9 + i]
+        for j in range(3):  # A = Jl^-1 R^T maps world rates
+            A[i, j] = E[i, 0] * T[j] + E[i, 1] * T[3 + j] + E[i, 2] * T[6 + j]
+    columns, joints, j = robot.jacobian, robot.joints, frame.joint
+    while j > 0:
+        joint = joints[j]
+        for col in range(joint.v_start, joint.v_start + joint.v_count):
+            J = columns[col]
+            x, y, z = J[3], J[4], J[5]
+            rows[0, col] = J[0] + y * T[11] - z * T[10]
+            rows[1, col] = J[1] + z * T[9] - x * T[11]
+            rows[2, col] = J[2] + x * T[10] - y * T[9]
+            for i in range(3):
+                rows[3 + i, col] = A[i, 0] * x + A[i, 1] * y + A[i, 2] * z
+        j = joint.parent
+    if not finite:
+        error[:] = np.nan
+
+
+@inner
+def relative_rotation(T: Vector, target: Vector, out: Matrix) -> bool:
+    """Write `R_wf^T R_wt`, or I for a target that is not finite; return if it is.
+
+    T is packed by columns, the target row by row.
+    """
+    finite = True
+    for i in range(12):
+        finite &= abs(target[i]) < LARGEST_FINITE
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = 1.0 if i == j else 0.0
+            if finite:
+                out[i, j] = T[3 * i] * target[j]
+                out[i, j] += T[3 * i + 1] * target[4 + j] + T[3 * i + 2] * target[8 + j]
+    return finite
 
 
 class FrameTask(RowTask):
@@ -42,7 +103,7 @@ class FrameTask(RowTask):
     Chirikjian (2012), "Stochastic Models, Information Theory, and Lie Groups", 10.86.
     """
 
-    kernel: ClassVar[Kernel] = Kernel.FRAME
+    kernel: ClassVar[Any] = frame_error
 
     def __init__(
         self,
@@ -101,8 +162,9 @@ class FrameTask(RowTask):
     def bind(self, configuration: Configuration) -> None:
         """Resolve the frame; without a target, hold its present pose."""
         frame = configuration.model.frames[configuration.frame_id(self.frame)]
-        self.joint, self.offset = int(frame.parentJoint), pack_pose(frame.placement)
-        self._support = configuration.support(self.frame)
+        self._frame = np.zeros(1, FRAME)
+        self._frame["joint"] = frame.parentJoint
+        self._frame["offset"] = pack_pose(frame.placement)
         if not self.target_row.is_set:
             self.set_target(configuration.frame_pose(self.frame))
 
@@ -110,14 +172,10 @@ class FrameTask(RowTask):
         """Return the velocity indices between the root and the frame."""
         return configuration.support(self.frame)
 
-    def evaluate(
-        self, configuration: Configuration, error: Vector, jacobian: Matrix
-    ) -> None:
-        """Write (e_p, e_r), m and rad, and its Jacobian."""
-        robot = configuration.robot
-        compute_joint_poses(robot)
-        joint, offset, target = self.joint, self.offset, self.target_row.values
-        frame_error(robot, joint, offset, target, self._support, error, jacobian)
+    def own(self, configuration: Configuration) -> Vector:
+        """Return a `FRAME` record."""
+        self._frame["target"] = self.target_row.values
+        return self._frame.view(np.float64).copy()
 
 
 class RelativeFrameTask(RowTask):

@@ -6,17 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from wbc_suite.compiling import as_argument, by_address
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.qp.constraints import Constraints, with_rows
-from wbc_suite.qp.frame_task import FrameTask
-from wbc_suite.qp.kernel import Kernel, kernel_of
+from wbc_suite.qp.joint_tasks import posture_error
 from wbc_suite.qp.limit import unlimited_bounds
+from wbc_suite.qp.part import STATE, Kernels, Numbers, kernel_of
 from wbc_suite.qp.problem import Problem
-from wbc_suite.qp.strict_level import LevelArrays
 from wbc_suite.qp.task import JointTask, RowTask, Task
-from wbc_suite.qp.task_kernels import TaskArrays, com_error, no_com
+from wbc_suite.qp.task_rows import TASK, LevelArrays
 from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 
@@ -39,12 +37,11 @@ class TickLayout:
 class Level:
     """Tasks of one strict level with their arrays, and the arrays of their problem.
 
-    Tasks are bound here. Layout and results are those of the stack, in which this is
-    level k.
+    Layout and results are those of the stack, in which this is level k; kernels and
+    numbers are those of all its parts.
 
     Attributes:
-        tasks: Arrays of the tasks.
-        qp: Arrays of the problem.
+        qp: Arrays of the problem, with the weighted rows of the tasks.
         arrays: What the kernels of `tick` read and write.
         python_parts: Tasks without a kernel.
     """
@@ -55,56 +52,66 @@ class Level:
         tasks: Sequence[Task],
         layout: TickLayout,
         results: Records,
+        kernels: Kernels,
+        numbers: Numbers,
         *,
         k: int,
     ) -> None:
-        for task in tasks:
-            task.bind(configuration)
         above = sum(size for _, size in layout.equalities)
         above += sum(task.dim for level in layout.levels[:k] for task, _ in level)
         own, p, nv = results[f"level {k}"], layout.inequalities, configuration.nv
-        multipliers = own["multipliers"]
         self._rows = layout.levels[k]
         self._joint_tasks = [t for t in tasks if isinstance(t, JointTask)]
-        rows, finite = [task for task, _ in self._rows], results["all_finite"]
-        self.tasks = _task_arrays(configuration, rows, self._joint_tasks, own, finite)
+        joints, m = self._joint_tasks, len(own["e"])
         self.qp: QpArrays = make_qp_arrays(
-            self.tasks.W,
-            self.tasks.e,
-            self.tasks.diagonal,
-            self.tasks.mu,
+            own["W"],
+            own["e"],
+            own["diagonal"],
+            np.zeros(1),
             inequalities=p,
-            equalities=len(multipliers) - nv - p,
+            equalities=len(own["multipliers"]) - nv - p,
             x=own["x"],
-            multipliers=multipliers,
+            multipliers=own["multipliers"],
         )
-        self._kept_counts: Indices = np.zeros(2, dtype=np.int64)
         self.arrays = LevelArrays(
-            tasks=as_argument(self.tasks),
-            qp=as_argument(self.qp),
+            tasks=_records([task for task, _ in self._rows], numbers),
+            joint_tasks=_records(joints, numbers),
+            error=np.zeros(m),
+            jacobian=np.zeros((m, nv)),
+            cost=np.zeros(m),
+            distances=own["distances"],
+            joint_error=np.zeros((len(joints), nv)),
+            squared_cost=np.reshape([t.squared_costs for t in joints], (-1, nv)),
+            bias=np.zeros((2, nv)),
+            qp=self.qp,
             above=np.zeros((above, nv)),
-            lengths=np.zeros(nv),
             kept=np.zeros((nv, nv)),
-            kept_counts=self._kept_counts,
+            kept_counts=np.zeros(2, dtype=np.int64),
         )
-        self._copies = self._attach_rows()
-        kernels = *self.tasks.kernel, *self.tasks.joint_kernel
-        pairs = zip((*rows, *self._joint_tasks), kernels, strict=True)
-        self.python_parts = [task for task, kernel in pairs if not kernel]
-        self.evaluate(configuration, Kernel.CONSTANT)
+        q_index = unlimited_bounds(configuration).q_index
+        places = [(t, rows, kernel_of(t)) for t, rows in self._rows]
+        places += [(t, k, _joint_kernel(t, q_index)) for k, t in enumerate(joints)]
+        self._python: list[tuple[Task, Any]] = []
+        records = *self.arrays.tasks, *self.arrays.joint_tasks
+        for (task, place, kernel), record in zip(places, records, strict=True):
+            record["kernel"], has_room = kernels.place(kernel)
+            if not has_room:
+                self._python.append((task, place))
+        self.python_parts = [task for task, _ in self._python]
+        self._copies = self._attach_costs()
 
     def reset(self) -> None:
         """Discard the active set and the basis of the last tick."""
         self.qp.side[:] = 0
-        self._kept_counts[:] = 0
+        self.arrays.kept_counts[:] = 0
 
     def state(self, problem: Problem) -> None:
         """Fill a problem of the right size with what a tick has stated."""
-        tasks, qp = self.tasks, self.qp
+        qp = self.qp
         count, size = len(problem.rows), len(problem.upper)
-        problem.H[:] = tasks.W.T @ tasks.W
-        problem.H += np.diag(tasks.diagonal[0] + tasks.mu)
-        problem.c[:] = -tasks.W.T @ tasks.e - tasks.diagonal[1]
+        problem.H[:] = qp.W.T @ qp.W
+        problem.H += np.diag(qp.diagonal[0] + qp.mu)
+        problem.c[:] = -qp.W.T @ qp.e - qp.diagonal[1]
         problem.rows[:], problem.wanted[:] = qp.rows[:count], qp.wanted
         problem.lower[:], problem.upper[:] = qp.lower[:size], qp.upper[:size]
         problem.weight = float(qp.weight[0])
@@ -117,29 +124,30 @@ class Level:
     def held(self) -> tuple[str, ...]:
         """Return the names of the tasks whose target was not finite."""
         tasks = *(task for task, _ in self._rows), *self._joint_tasks
-        held = *np.isnan(self.tasks.distances[:, 0]), *(self.tasks.joint_finite == 0)
-        return tuple(t.name for t, is_held in zip(tasks, held, strict=True) if is_held)
+        finite = [
+            *self.arrays.tasks["is_finite"],
+            *self.arrays.joint_tasks["is_finite"],
+        ]
+        return tuple(
+            t.name for t, known in zip(tasks, finite, strict=True) if not known
+        )
 
-    def _attach_rows(self) -> list[Vector]:
-        """Let targets and costs follow those of the tasks; return the copies."""
-        tasks, copies = self.tasks, list[Vector]()
-        for (task, rows), target in zip(self._rows, tasks.target, strict=True):
-            copies += [tasks.cost[rows], target[: task.target_row.values.size]]
-            task.cost_row.attach(copies[-2])
-            task.target_row.attach(copies[-1])
-        for task, target in zip(self._joint_tasks, tasks.joint_target, strict=True):
-            copies.append(target[: task.target_row.values.size])
-            task.target_row.attach(copies[-1])
+    def _attach_costs(self) -> list[Vector]:
+        """Let costs follow those of the tasks; return the copies."""
+        copies = [self.arrays.cost[rows] for _, rows in self._rows]
+        for (task, _), copy in zip(self._rows, copies, strict=True):
+            task.cost_row.attach(copy)
         return copies
 
-    def evaluate(self, configuration: Configuration, kernel: Kernel) -> None:
-        """Evaluate all tasks of a kind in Python."""
-        tasks = self.tasks
-        for k in np.flatnonzero(tasks.kernel == kernel).tolist():
-            task, rows = self._rows[k]
-            task.evaluate(configuration, tasks.error[rows], tasks.jacobian[rows])
-        for k in np.flatnonzero(tasks.joint_kernel == kernel).tolist():
-            self._joint_tasks[k].evaluate(configuration, tasks.joint_error[k])
+    def evaluate(self, configuration: Configuration) -> None:
+        """Evaluate the tasks that have no kernel."""
+        arrays = self.arrays
+        for task, place in self._python:
+            if isinstance(task, JointTask):
+                task.evaluate(configuration, arrays.joint_error[place])
+            else:
+                error, jacobian = arrays.error[place], arrays.jacobian[place]
+                task.evaluate(configuration, error, jacobian)
 
 
 def tick_layout(
@@ -150,9 +158,7 @@ def tick_layout(
     fields: list[Any] = [
         ("x", float, (nv,)),
         ("v", float, (nv,)),
-        ("residual", float, (1,)),
-        ("all_finite", float, (1,)),
-        ("overshoot_damping", float, (1,)),
+        ("state", float, (STATE.itemsize // 8,)),
         ("before", float, (2, nv)),
     ]
     for k, own in enumerate(by_level(tasks)):
@@ -184,60 +190,22 @@ def by_level(tasks: Sequence[Task]) -> list[list[Task]]:
     return [[task for task in tasks if task.level == k] for k in numbers]
 
 
-def _task_arrays(
-    configuration: Configuration,
-    rows: Sequence[RowTask],
-    joints: Sequence[JointTask],
-    results: Records,
-    all_finite: Vector,
-) -> TaskArrays:
-    """Return the arrays of bound tasks."""
-    nv, nq, n, k = configuration.nv, configuration.nq, len(rows), len(joints)
-    row_start = np.cumsum([0, *(task.dim for task in rows)], dtype=np.int64)
-    angular = np.array([task.angular_start for task in rows], dtype=np.int64)
-    m, supports = int(row_start[-1]), [task.support(configuration) for task in rows]
-    q_index = unlimited_bounds(configuration).q_index
-    joint, offset = np.zeros(n, dtype=np.int64), np.zeros((n, 12))
-    for row, task in enumerate(rows):
-        if isinstance(task, FrameTask):
-            joint[row], offset[row] = task.joint, task.offset
-    joint_kernel = [_joint_kernel(task, q_index) for task in joints]
-    kernel = np.array([kernel_of(task) for task in rows], dtype=np.int64)
-    com, vector = com_error if Kernel.COM in kernel else no_com, np.zeros(1)
-    return TaskArrays(
-        write_com=by_address(com, configuration.robot, vector, vector, np.eye(1)),
-        kernel=kernel,
-        joint=joint,
-        offset=offset,
-        target=np.zeros((n, 12)),
-        row_start=row_start,
-        angular_start=row_start[:-1] + angular,
-        support_start=np.cumsum([0, *(len(s) for s in supports)], dtype=np.int64),
-        support=np.concatenate([np.zeros(0), *supports]).astype(np.int64),
-        error=np.zeros(m),
-        jacobian=np.zeros((m, nv)),
-        cost=np.zeros(m),
-        gain=np.array([task.gain for task in rows], dtype=np.float64),
-        max_speed=np.reshape([task.max_speeds for task in rows], (n, 2)),
-        distances=results["distances"],
-        joint_kernel=np.array(joint_kernel, dtype=np.int64),
-        joint_target=np.zeros((k, nq)),
-        joint_error=np.zeros((k, nv)),
-        squared_cost=np.reshape([task.squared_costs for task in joints], (k, nv)),
-        joint_gain=np.array([task.gain for task in joints], dtype=np.float64),
-        joint_speed=np.array([task.max_speed for task in joints], dtype=np.float64),
-        joint_finite=np.ones(k, dtype=np.int64),
-        q_index=q_index,
-        bias=np.zeros((2, nv)),
-        W=results["W"],
-        e=results["e"],
-        diagonal=results["diagonal"],
-        mu=np.zeros(1),
-        all_finite=all_finite,
-    )
+def _records(tasks: Sequence[Task], numbers: Numbers) -> Records:
+    """Return `TASK` records without kernels."""
+    records, row = np.zeros(len(tasks), TASK), 0
+    for record, task in zip(records, tasks, strict=True):
+        record["first"], record["last"] = numbers.of(task)
+        record["gain"], record["is_finite"] = task.gain, 1
+        if isinstance(task, JointTask):
+            record["speed"] = task.max_speed
+        else:
+            record["row"], record["end"] = row, row + task.dim
+            record["angle"] = row + task.angular_start
+            record["speed"], row = task.max_speeds, row + task.dim
+    return records
 
 
-def _joint_kernel(task: JointTask, q_index: Indices) -> Kernel:
+def _joint_kernel(task: JointTask, q_index: Indices) -> Any:
     """Return the kernel of a task; joints with several parameters are Pinocchio's."""
     kernel, several = kernel_of(task), task.squared_costs[q_index < 0].any()
-    return Kernel.PYTHON if kernel is Kernel.POSTURE and several else kernel
+    return None if kernel is posture_error and several else kernel

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, inner
+from wbc_suite.compiling import inner
 from wbc_suite.linear_algebra import dot
 from wbc_suite.typing import Matrix, Vector
 
@@ -12,7 +12,7 @@ LARGEST_FINITE = (
 _SMALL_ANGLE = 1e-4  # below it series are exact to 1e-16
 
 
-@compiled
+@inner
 def log3(R: Matrix, out: Vector) -> float:
     """Write the rotation vector of R, shape (3,), and return its angle in [0, pi].
 
@@ -49,7 +49,7 @@ def log3(R: Matrix, out: Vector) -> float:
     return angle
 
 
-@compiled
+@inner
 def exp3(x: float, y: float, z: float, out: Matrix) -> None:
     """Write the rotation of a rotation vector r, `I + a [r] + b [r]^2`, shape (3, 3).
 

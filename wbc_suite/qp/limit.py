@@ -3,17 +3,16 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from enum import IntEnum
-from typing import Any, ClassVar, NamedTuple, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc_suite.compiling import by_address, compiled, inner, struct
+from wbc_suite.compiling import inner, record_type
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.configuration import named_joints
-from wbc_suite.kinematics.forward import RobotArrays
-from wbc_suite.qp.kernel import Kernel
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.qp.part import run_kernel
+from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
 
 
 class LimitKind(IntEnum):
@@ -47,17 +46,18 @@ class BoxLimit(ABC):
         """Tighten the bounds in place; called once, when a stack is built."""
 
 
-class RowLimit(ABC):
+class RowLimit:
     """A limit `G dq <= h` of a fixed number of rows.
 
-    A solution never violates it as long as one exists. A subclass sets `dim` and writes
-    `rows`, as the guide of QP stacks shows; `subject` and `kind` are for reports.
+    A solution never violates it as long as one exists. A subclass sets `dim`, and
+    writes `rows`, or names a `kernel` and its numbers, as the guide of QP stacks shows;
+    `subject` and `kind` are for reports.
 
     A row with h < 0 is outside its limit. It leads back softly and may go no further
     out, so that other rows can still be kept.
 
     Attributes:
-        kernel: What writes the rows, see `kernel_of`.
+        kernel: What writes G and h, see `part`.
         dim: Number of rows.
         kind: What reports call the rows.
         unit: Unit of `G dq` and h.
@@ -65,16 +65,19 @@ class RowLimit(ABC):
             may go further out, so that other rows can lead back; infinity is never.
     """
 
-    kernel: ClassVar[Kernel] = Kernel.PYTHON
+    kernel: ClassVar[Any] = None
     dim: int
     kind: LimitKind = LimitKind.OTHER
     unit: str = "m"
     relax_speed: float = np.inf
 
-    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
+    def bind(self, configuration: Configuration) -> None:
         """Resolve names in a model; called when a stack is built."""
 
-    @abstractmethod
+    def own(self, configuration: Configuration) -> Vector:
+        """Return the numbers that the kernel reads and may write, the limit's array."""
+        return np.zeros(0)
+
     def rows(
         self, configuration: Configuration, dt: float, G: Matrix, h: Vector
     ) -> None:
@@ -82,8 +85,9 @@ class RowLimit(ABC):
 
         G is zero before the first call. Unused rows are 0 <= inf.
         """
+        run_kernel(self, configuration.robot, self.own(configuration), dt, G, h)
 
-    def reset(self) -> None:  # noqa: B027, may be empty
+    def reset(self) -> None:
         """Discard memory of earlier ticks; called by a stack's `reset`."""
 
     @property
@@ -96,47 +100,49 @@ class RowLimit(ABC):
         return f"{type(self).__name__}[{row}]"
 
 
-def write_rows(
-    kernel: Any, robot: RobotArrays, arrays: Any, dt: float, G: Matrix, h: Vector
-) -> None:
-    """Let a kernel write rows by its address, as in ticks: it is compiled once."""
-    _call(by_address(kernel, robot, arrays, dt, G, h), robot, arrays, dt, G, h)
-
-
-@compiled
-def _call(
-    kernel: Any, robot: RobotArrays, arrays: Any, dt: float, G: Matrix, h: Vector
-) -> None:
-    kernel(robot, arrays, dt, G, h)
-
-
 Limit: TypeAlias = BoxLimit | RowLimit
 """What a stack takes as a limit."""
 
 
-@struct
-class JointBounds(NamedTuple):
-    """Limits of joints, one entry per velocity, which a stack's limits fill in."""
+BOUND = record_type(
+    ("q_index", "i8"),  # position index of the velocity, -1 where it has none
+    ("q_lower", "f8"),  # lower position limit, rad or m, -inf where there is none
+    ("q_upper", "f8"),  # upper position limit
+    ("position_gain", "f8"),  # fraction of the distance to it that a step may cover
+    ("v_max", "f8"),  # speed limit, rad/s or m/s, inf where there is none
+    ("a_max", "f8"),  # acceleration limit, inf where there is none
+    ("step_max", "f8", (2,)),  # greatest next steps down and up; inf: none
+)
+"""Limits of the joint of one velocity."""
 
-    q_index: Indices  # position index of each velocity, -1 where it has none
-    q_lower: Vector  # lower position limits, -inf where there is none
-    q_upper: Vector  # upper position limits
-    position_gain: Vector  # fraction of the distance to a limit that a step may cover
-    v_max: Vector  # speed limits, inf where there is none
-    a_max: Vector  # acceleration limits, inf where there is none
-    step_max: Matrix  # (2, nv), greatest next steps down and up; inf: none
+
+class JointBounds(np.recarray[Any, np.dtype[np.record]]):  # pyright: ignore[reportIncompatibleVariableOverride]
+    """Limits of joints, one entry per velocity, which a stack's limits fill in.
+
+    Fields are those of `BOUND`; each is a view of shape (nv,).
+    """
+
+    q_index: Indices
+    q_lower: Vector
+    q_upper: Vector
+    position_gain: Vector
+    v_max: Vector
+    a_max: Vector
+    step_max: Matrix
 
 
 def unlimited_bounds(configuration: Configuration) -> JointBounds:
     """Return infinite bounds."""
-    nv = configuration.nv
-    q_index = np.full(nv, -1, dtype=np.int64)
+    bounds = np.zeros(configuration.nv, BOUND).view(JointBounds)
+    bounds.q_index[:] = -1
     for _, joint in named_joints(configuration.model):
         if joint.nq == 1 and joint.nv == 1:
-            q_index[joint.idx_v] = joint.idx_q
-    infinite, step_max = np.full(nv, np.inf), np.full((2, nv), np.inf)
-    none = infinite.copy(), infinite.copy()
-    return JointBounds(q_index, -infinite, infinite, np.ones(nv), *none, step_max)
+            bounds.q_index[joint.idx_v] = joint.idx_q
+    bounds.q_lower[:] = -np.inf
+    bounds.position_gain[:] = 1.0
+    for values in (bounds.q_upper, bounds.v_max, bounds.a_max, bounds.step_max):
+        values[:] = np.inf
+    return bounds
 
 
 def joint_values(
@@ -161,17 +167,9 @@ def joint_values(
     return found
 
 
-def joint_movers(configuration: Configuration) -> Matrix:
-    """Return 1 where a velocity moves a joint, else 0, shape (njoints, nv)."""
-    moves = np.zeros((len(configuration.model.joints), configuration.nv))
-    for joint, row in enumerate(moves):
-        row[configuration.joint_support(joint)] = 1.0
-    return moves
-
-
-@compiled
+@inner
 def merge_bounds(
-    bounds: JointBounds,
+    bounds: CompiledRecords,
     q: Vector,
     v_previous: Vector,
     dt: float,
@@ -190,37 +188,38 @@ def merge_bounds(
     `kinds`, shape (2 nv,), gets the `LimitKind` that set each lower, then each upper
     bound.
     """
-    nv, q_index, gain = lower.shape[0], bounds.q_index, bounds.position_gain
-    q_lower, q_upper = bounds.q_lower, bounds.q_upper
-    v_max, a_max, step_max = bounds.v_max, bounds.a_max, bounds.step_max
+    nv = lower.shape[0]
     for i in range(nv):
-        window = a_max[i] * dt * dt
+        own, k = bounds[i], bounds[i].q_index
+        window, v_max = own.a_max * dt * dt, own.v_max * dt
         lo, hi = v_previous[i] * dt - window, v_previous[i] * dt + window
         lo_kind = hi_kind = LimitKind.ACCELERATION.value
-        k = q_index[i]
         if k >= 0:
-            bottom = -braking_step(q[k] - q_lower[i], gain[i], a_max[i], dt)
-            top = braking_step(q_upper[i] - q[k], gain[i], a_max[i], dt)
+            bottom = -braking_step(q[k] - own.q_lower, own.position_gain, own.a_max, dt)
+            top = braking_step(own.q_upper - q[k], own.position_gain, own.a_max, dt)
             bottom_kind = top_kind = LimitKind.POSITION.value
-            if -step_max[0, i] > bottom:
-                bottom_kind = LimitKind.TRACKING.value
-                bottom = min(-step_max[0, i], top)
-            if step_max[1, i] < top:
-                top_kind = LimitKind.TRACKING.value
-                top = max(step_max[1, i], bottom)
-            if lo < bottom or lo > top:
-                lo_kind = bottom_kind if lo < bottom else top_kind
-                lo = min(max(lo, bottom), top)
-            if hi < bottom or hi > top:
-                hi_kind = bottom_kind if hi < bottom else top_kind
-                hi = min(max(hi, bottom), top)
-        step = v_max[i] * dt
-        if lo < -step or lo > step:
-            lo, lo_kind = min(max(lo, -step), step), LimitKind.VELOCITY.value
-        if hi < -step or hi > step:
-            hi, hi_kind = min(max(hi, -step), step), LimitKind.VELOCITY.value
-        lower[i], upper[i] = lo, hi
-        kinds[i], kinds[nv + i] = lo_kind, hi_kind
+            down, up = own.step_max[0], own.step_max[1]
+            if -down > bottom:
+                bottom_kind, bottom = LimitKind.TRACKING.value, min(-down, top)
+            if up < top:
+                top_kind, top = LimitKind.TRACKING.value, max(up, bottom)
+            lo, lo_kind = _clip(lo, lo_kind, bottom, bottom_kind, top, top_kind)
+            hi, hi_kind = _clip(hi, hi_kind, bottom, bottom_kind, top, top_kind)
+        kind = LimitKind.VELOCITY.value
+        lower[i], kinds[i] = _clip(lo, lo_kind, -v_max, kind, v_max, kind)
+        upper[i], kinds[nv + i] = _clip(hi, hi_kind, -v_max, kind, v_max, kind)
+
+
+@inner
+def _clip(
+    x: float, kind: int, low: float, low_kind: int, high: float, high_kind: int
+) -> tuple[float, int]:
+    """Return x within an interval, and the kind of what bounds it."""
+    if x < low:
+        return low, low_kind
+    if x > high:
+        return high, high_kind
+    return x, kind
 
 
 @inner

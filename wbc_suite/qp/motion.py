@@ -6,8 +6,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from wbc_suite.qp.overshoot import turned
+from wbc_suite.qp.part import STATE
 from wbc_suite.qp.report import TickRecord
+from wbc_suite.qp.tick import turned
 from wbc_suite.typing import Vector
 
 AT_REST = 0.005
@@ -89,7 +90,9 @@ def reasons_to_move(record: TickRecord, conflicts: tuple[str, ...]) -> Iterator[
     back = [i for i in range(len(v)) if turned(v[i], past[0, i], past[1, i])]
     if back:
         worst = max(back, key=lambda i: float(change[i]))
-        yield Overshoot(joints[worst], float(results["overshoot_damping"][0]))
+        yield Overshoot(
+            joints[worst], float(results["state"].view(STATE)["overshoot_damping"][0])
+        )
     k = int(np.argmax(speeds))
     unit = f"{record.layout.units[k]}/s"
     yield Approach(_served(record, results["x"]), joints[k], abs(float(v[k])), unit)

@@ -6,13 +6,12 @@ from typing import Any, TypeVar
 
 from wbc_suite.errors import ConfigError, WbcError
 from wbc_suite.qp.com_task import ComTask
-from wbc_suite.qp.floor_limit import FloorLimit
 from wbc_suite.qp.frame_task import FrameTask, RelativeFrameTask
-from wbc_suite.qp.joint_coupling_task import JointCouplingTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
+from wbc_suite.qp.joint_tasks import DampingTask, JointCouplingTask, PostureTask
 from wbc_suite.qp.limit import Limit
 from wbc_suite.qp.look_at_task import LookAtTask
-from wbc_suite.qp.posture_task import DampingTask, PostureTask
+from wbc_suite.qp.plane_limits import FloorLimit
 from wbc_suite.qp.task import Task
 from wbc_suite.registry import Registry
 

@@ -3,24 +3,28 @@
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_count, check_number
-from wbc_suite.compiling import as_argument
 from wbc_suite.kinematics import Configuration
-from wbc_suite.kinematics.forward import compute_joint_poses
-from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers, write_rows
-from wbc_suite.qp.self_collision_rows import CapsuleArrays, self_collision_rows
+from wbc_suite.qp.limit import LimitKind, RowLimit
+from wbc_suite.qp.part import joined, run_kernel
+from wbc_suite.qp.self_collision_rows import (
+    CAPSULE,
+    PAIR,
+    ROW,
+    SETTINGS,
+    self_collision_rows,
+)
 from wbc_suite.robot.collision_capsules import (
     EnclosingCapsule,
     collision_pairs,
     enclosing_capsules,
 )
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Indices, Records, Vector
 
 if TYPE_CHECKING:
     from wbc_suite.robot import RobotDescription
@@ -58,7 +62,8 @@ class SelfCollisionLimit(RowLimit):
         rate: Approach speed per distance left, 1/s.
 
     Attributes:
-        capsules: The capsules; links that the model has rigid may move in `arrays`.
+        capsules: The capsules.
+        placed: `CAPSULE` records; links that the model has rigid may move in them.
         found: Pair of each row of the last tick, nearest first; -1 for none.
         distances: Distance of each row's pair, m; inf for none.
 
@@ -69,7 +74,7 @@ class SelfCollisionLimit(RowLimit):
     of Manipulators With a High Number of Degrees of Freedom", ICRA.
     """
 
-    kernel: ClassVar[Kernel] = Kernel.SELF_COLLISION
+    kernel: ClassVar[Any] = self_collision_rows
     kind = LimitKind.SELF_COLLISION
     relax_speed = 0.1  # m/s: links that start inside each other, 1 cm at the usual rate
 
@@ -115,68 +120,48 @@ class SelfCollisionLimit(RowLimit):
 
     def drop_touching(self, configuration: Configuration) -> None:
         """Leave out the capsule pairs that are nearer than the margin right now."""
-        count, robot = len(self._pairs), configuration.robot
-        arrays = self._make_arrays(configuration, count, self.margin)
-        compute_joint_poses(robot)
+        count = len(self._pairs)
+        own, (*_, rows) = self._numbers(configuration, count, self.margin)
         G, h = np.zeros((count, configuration.nv)), np.zeros(count)
-        write_rows(self_collision_rows, robot, as_argument(arrays), 1.0, G, h)
-        touching = arrays.found[arrays.found >= 0]
+        run_kernel(self, configuration.robot, own, 1.0, G, h)
+        touching = rows["found"][rows["found"] >= 0]
         self._pairs = np.delete(self._pairs, touching, axis=0)
         self._model = None
         self.bind(configuration)
 
     def bind(self, configuration: Configuration) -> None:
-        """Resolve links to joints. Stacks on one model share the arrays.
+        """Resolve links to joints. Stacks on one model share the numbers.
 
         Raises:
             UnknownNameError: If a link is no frame of the model.
         """
         if self._model is not configuration.model:
-            self.arrays = self._make_arrays(configuration, self.dim, self.influence)
-            self.found, self.distances = self.arrays.found, self.arrays.distance
-            self.argument = as_argument(self.arrays)
+            own, views = self._numbers(configuration, self.dim, self.influence)
+            self._own, (self._settings, self.placed, _, rows) = own, views
+            self.found, self.distances = rows["found"], rows["distance"]
             self._model = configuration.model
 
-    def _make_arrays(
+    def _numbers(
         self, configuration: Configuration, rows: int, influence: float
-    ) -> CapsuleArrays:
+    ) -> tuple[Vector, list[Records]]:
+        """Return the kernel's numbers for so many rows, and views of them."""
         count, frames = len(self.capsules), configuration.model.frames
-        links = [frames[configuration.frame_id(c.link)] for c in self.capsules]
-        ends = [
-            frame.placement.act(np.array(end))
-            for frame, capsule in zip(links, self.capsules, strict=True)
-            for end in (capsule.start, capsule.end)
-        ]
-        return CapsuleArrays(
-            joint=np.array([frame.parentJoint for frame in links], dtype=np.int64),
-            ends=np.reshape(ends, (count, 6)),
-            radius=np.array([c.radius for c in self.capsules], dtype=np.float64),
-            pairs=self._pairs.ravel().copy(),
-            moves=joint_movers(configuration),
-            margin=self.margin,
-            influence=influence,
-            rate=self.rate,
-            world=np.zeros((count, 2, 3)),
-            middle=np.zeros((count, 3)),
-            reach=np.zeros(count),
-            listed=np.zeros(len(self._pairs), dtype=np.int64),
-            listed_count=np.full(1, -1, dtype=np.int64),
-            listed_middle=np.zeros((count, 3)),
-            found=np.full(rows, -1, dtype=np.int64),
-            distance=np.full(rows, np.inf),
-        )
-
-    def rows(
-        self, configuration: Configuration, dt: float, G: Matrix, h: Vector
-    ) -> None:
-        """Write the dampers of the nearest pairs, `-n . (J_a - J_b) dq <= ...`."""
-        robot = configuration.robot
-        compute_joint_poses(robot)
-        write_rows(self_collision_rows, robot, self.argument, dt, G, h)
+        pairs = len(self._pairs)
+        own, views = joined((SETTINGS, 1), (CAPSULE, count), (PAIR, pairs), (ROW, rows))
+        settings, placed, of_pairs, of_rows = views
+        settings[0] = count, pairs, self.margin, influence, self.rate, -1
+        for record, capsule in zip(placed, self.capsules, strict=True):
+            frame = frames[configuration.frame_id(capsule.link)]
+            ends = np.array([capsule.start, capsule.end])
+            record["joint"], record["radius"] = frame.parentJoint, capsule.radius
+            record["ends"] = [frame.placement.act(end) for end in ends]
+        of_pairs["first"], of_pairs["second"] = self._pairs.T
+        of_rows["found"], of_rows["distance"] = -1, np.inf
+        return own, views
 
     def reset(self) -> None:
         """Discard the list of near pairs."""
-        self.arrays.listed_count[0] = -1
+        self._settings["listed"] = -1
 
     @property
     def pair_count(self) -> int:
@@ -186,7 +171,11 @@ class SelfCollisionLimit(RowLimit):
     @property
     def listed_count(self) -> int:
         """Number of capsule pairs near enough to be measured at the last tick."""
-        return int(self.arrays.listed_count[0])
+        return int(self._settings["listed"][0])
+
+    def own(self, configuration: Configuration) -> Vector:
+        """Return the kernel's numbers."""
+        return self._own
 
     def subject(self, row: int) -> LinkPair:
         """Return the two links of a row of the last tick."""

@@ -1,14 +1,13 @@
 """Compiled search for the nearest pairs of capsules, and rows that keep them apart."""
 
-from typing import NamedTuple
-
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inline, inner, struct
+from wbc_suite.compiling import inner, record_type
 from wbc_suite.kinematics.forward import RobotArrays
-from wbc_suite.linear_algebra import copy_rows
+from wbc_suite.linear_algebra import copy_vector
+from wbc_suite.qp.part import place_point
 from wbc_suite.qp.problem import UNBOUNDED
-from wbc_suite.typing import Array, Indices, Matrix, Vector
+from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
 
 SKIN = 0.1
 """m; a list holds pairs within the influence and this distance, and is made again when
@@ -20,66 +19,92 @@ _PARALLEL = 1e-12  # squared sine of the angle between parallel segments
 _TOUCHING = 1e-9  # m; nearer segments have no direction between them
 
 
-@struct
-class CapsuleArrays(NamedTuple):
-    """n capsules of which p pairs are kept apart by k rows, in m."""
+SETTINGS = record_type(
+    ("capsules", "i8"),  # n
+    ("pairs", "i8"),  # p
+    ("margin", "f8"),  # distance that is kept
+    ("influence", "f8"),  # pairs further apart are left out
+    ("rate", "f8"),  # approach speed per distance left, 1/s
+    ("listed", "i8"),  # number of listed pairs; -1 before the first search
+)
+"""Of a self-collision limit, in m."""
 
-    joint: Indices  # (n,), joint of each capsule
-    ends: Matrix  # (n, 6), both ends of its segment in the joint
-    radius: Vector  # (n,)
-    pairs: Indices  # (2 p,), capsules of each pair, one after another
-    moves: Matrix  # (njoints, nv), 1 where a velocity moves a joint, else 0
-    margin: float  # distance that is kept
-    influence: float  # pairs further apart are left out
-    rate: float  # approach speed per distance left, 1/s
-    world: Array  # (n, 2, 3), scratch: ends in the world
-    middle: Matrix  # (n, 3), scratch: middles of the segments
-    reach: Vector  # (n,), scratch: radii of balls around the capsules
-    listed: Indices  # (p,), pairs near enough to be measured
-    listed_count: Indices  # (1,), how many they are; -1 before the first search
-    listed_middle: Matrix  # (n, 3), where the middles were when the list was made
-    found: Indices  # (k,), output: pair of each row, nearest first, -1 for none
-    distance: Vector  # (k,), output: distance of each row's pair, inf for none
+CAPSULE = record_type(
+    ("joint", "i8"),
+    ("ends", "f8", (2, 3)),  # of its segment, in the joint
+    ("radius", "f8"),
+    ("world", "f8", (2, 3)),  # scratch: ends in the world
+    ("middle", "f8", (3,)),  # scratch: middle of the segment
+    ("reach", "f8"),  # scratch: radius of a ball around it
+    ("listed_middle", "f8", (3,)),  # where the middle was when the list was made
+)
+"""A capsule on a link, in m."""
+
+PAIR = record_type(
+    ("first", "i8"),  # its capsules
+    ("second", "i8"),
+    ("listed", "i8"),  # list of the pairs that are near enough to be measured
+)
+
+ROW = record_type(
+    ("found", "i8"),  # output: pair of the row, nearest first, -1 for none
+    ("distance", "f8"),  # output: its distance, m, inf for none
+)
+
+_SETTINGS, _CAPSULE, _PAIR = (x.itemsize // 8 for x in (SETTINGS, CAPSULE, PAIR))
 
 
 @inner
 def self_collision_rows(
-    robot: RobotArrays, capsules: CapsuleArrays, dt: float, G: Matrix, h: Vector
+    robot: RobotArrays, own: Vector, dt: float, rows: Matrix, values: Vector
 ) -> None:
-    """Write the velocity dampers of the nearest pairs; joint poses are current.
+    """Write the velocity dampers of the nearest pairs.
 
-    G, shape (k, nv), gets `-d(distance)/dq` of each row, 0 where there is none; h gets
-    how far each pair may approach in dt seconds, m.
+    Own are `SETTINGS`, n `CAPSULE`, p `PAIR` and k `ROW` records. Rows get
+    `-d(distance)/dq`, 0 where there is none; values get how far each pair may approach
+    in dt seconds, m.
     """
-    _find_nearest(robot, capsules)
-    for row in range(h.shape[0]):
-        _write_row(robot, capsules, row, G[row])
-        speed = capsules.rate * (capsules.distance[row] - capsules.margin)
-        h[row] = min(max(speed, -SEPARATION) * dt, UNBOUNDED)
-
-
-@compiled_inline
-def _find_nearest(robot: RobotArrays, capsules: CapsuleArrays) -> None:
-    """Find the nearest pairs within the influence, and their distances."""
+    settings = own[:_SETTINGS].view(SETTINGS)[0]
+    end = _SETTINGS + _CAPSULE * settings.capsules
+    capsules = own[_SETTINGS:end].view(CAPSULE)
+    last = end + _PAIR * settings.pairs
+    pairs, places = own[end:last].view(PAIR), own[last:].view(ROW)
     _place_capsules(robot, capsules)
-    _update_list(capsules)
-    found, distance, world = capsules.found, capsules.distance, capsules.world
-    found[:], distance[:] = -1, np.inf
-    rows, total = found.shape[0], 0
-    for k in range(capsules.listed_count[0]):
-        pair = capsules.listed[k]
-        a, b = capsules.pairs[2 * pair], capsules.pairs[2 * pair + 1]
-        limit = min(capsules.influence, distance[rows - 1])
-        far = capsules.reach[a] + capsules.reach[b] + limit
-        if _square_distance(capsules.middle[a], capsules.middle[b]) > far * far:
+    _update_list(settings, capsules, pairs)
+    _find_nearest(settings, capsules, pairs, places)
+    for row in range(values.shape[0]):
+        _write_row(robot, capsules, pairs, places[row].found, rows[row])
+        speed = settings.rate * (places[row].distance - settings.margin)
+        values[row] = min(max(speed, -SEPARATION) * dt, UNBOUNDED)
+
+
+@inner
+def _find_nearest(
+    settings: CompiledRecords,
+    capsules: CompiledRecords,
+    pairs: CompiledRecords,
+    places: CompiledRecords,
+) -> None:
+    """Find the nearest pairs within the influence, and their distances."""
+    found, distance = places["found"], places["distance"]
+    count, total = found.shape[0], 0
+    for k in range(count):
+        found[k], distance[k] = -1, np.inf
+    for k in range(settings.listed):
+        pair = pairs[k].listed
+        a, b = capsules[pairs[pair].first], capsules[pairs[pair].second]
+        limit = min(settings.influence, distance[count - 1])
+        far = a.reach + b.reach + limit
+        if _square_distance(a.middle, b.middle) > far * far:
             continue
-        s, t = segment_parameters(world[a, 0], world[a, 1], world[b, 0], world[b, 1])
+        A, B = a.world, b.world
+        s, t = segment_parameters(A[0], A[1], B[0], B[1])
         square = 0.0
         for i in range(3):
-            x = world[a, 0, i] + s * (world[a, 1, i] - world[a, 0, i])
-            x -= world[b, 0, i] + t * (world[b, 1, i] - world[b, 0, i])
+            x = A[0, i] + s * (A[1, i] - A[0, i])
+            x -= B[0, i] + t * (B[1, i] - B[0, i])
             square += x * x
-        d = np.sqrt(square) - capsules.radius[a] - capsules.radius[b]
+        d = np.sqrt(square) - a.radius - b.radius
         if d < limit:
             insert_nearest(found, distance, total, pair, float(d))
             total += 1
@@ -98,40 +123,42 @@ def insert_nearest(
 
 
 @inner
-def _place_capsules(robot: RobotArrays, capsules: CapsuleArrays) -> None:
+def _place_capsules(robot: RobotArrays, capsules: CompiledRecords) -> None:
     """Write ends, middles and bounding balls in the world."""
-    for c in range(capsules.joint.shape[0]):
-        T, square = robot.pose[capsules.joint[c]], 0.0
-        world, middle = capsules.world[c], capsules.middle[c]
+    poses = robot.pose
+    for c in range(capsules.shape[0]):
+        capsule, square = capsules[c], 0.0
+        T, ends, world = poses[capsule.joint], capsule.ends, capsule.world
+        for end in range(2):
+            place_point(T, ends[end], world[end])
         for i in range(3):
-            for end in range(2):
-                x = capsules.ends[c, 3 * end : 3 * end + 3]
-                world[end, i] = T[9 + i]
-                world[end, i] += T[i] * x[0] + T[3 + i] * x[1] + T[6 + i] * x[2]
-            middle[i] = 0.5 * (world[0, i] + world[1, i])
+            capsule.middle[i] = 0.5 * (world[0, i] + world[1, i])
             square += (world[0, i] - world[1, i]) ** 2
-        capsules.reach[c] = capsules.radius[c] + 0.5 * np.sqrt(square)
+        capsule.reach = capsule.radius + 0.5 * np.sqrt(square)
 
 
 @inner
-def _update_list(capsules: CapsuleArrays) -> None:
+def _update_list(
+    settings: CompiledRecords, capsules: CompiledRecords, pairs: CompiledRecords
+) -> None:
     """List the pairs that may be within the influence, if capsules have moved."""
-    middle, known = capsules.middle, capsules.listed_middle
-    is_current = capsules.listed_count[0] >= 0
-    for c in range(middle.shape[0]):
-        moved = _square_distance(middle[c], known[c])
+    is_current = settings.listed >= 0
+    for c in range(capsules.shape[0]):
+        capsule = capsules[c]
+        moved = _square_distance(capsule.middle, capsule.listed_middle)
         is_current = is_current and moved < (0.49 * SKIN) ** 2
     if is_current:
         return
-    copy_rows(middle, known)
+    for c in range(capsules.shape[0]):
+        copy_vector(capsules[c].middle, capsules[c].listed_middle)
     count = 0
-    for pair in range(capsules.listed.shape[0]):
-        a, b = capsules.pairs[2 * pair], capsules.pairs[2 * pair + 1]
-        far = capsules.reach[a] + capsules.reach[b] + capsules.influence + SKIN
-        if not _square_distance(middle[a], middle[b]) > far * far:
-            capsules.listed[count] = pair
+    for pair in range(pairs.shape[0]):
+        a, b = capsules[pairs[pair].first], capsules[pairs[pair].second]
+        far = a.reach + b.reach + settings.influence + SKIN
+        if not _square_distance(a.middle, b.middle) > far * far:
+            pairs[count].listed = pair
             count += 1
-    capsules.listed_count[0] = count
+    settings.listed = count
 
 
 @inner
@@ -142,19 +169,23 @@ def _square_distance(a: Vector, b: Vector) -> float:
 
 @inner
 def _write_row(
-    robot: RobotArrays, capsules: CapsuleArrays, row: int, out: Vector
+    robot: RobotArrays,
+    capsules: CompiledRecords,
+    pairs: CompiledRecords,
+    pair: int,
+    out: Vector,
 ) -> None:
-    """Write `-n . (J_a - J_b)` at the nearest points of a row's pair.
+    """Write `-n . (J_a - J_b)` at the nearest points of a pair; 0 for the pair -1.
 
     Velocities that move both bodies turn them together and leave the distance as it
     is, so only those that move one of them count.
     """
-    pair = capsules.found[row]
-    out[:] = 0.0
+    for col in range(out.shape[0]):
+        out[col] = 0.0
     if pair < 0:
         return
-    a, b = capsules.pairs[2 * pair], capsules.pairs[2 * pair + 1]
-    A, B = capsules.world[a], capsules.world[b]
+    a, b = capsules[pairs[pair].first], capsules[pairs[pair].second]
+    A, B = a.world, b.world
     s, t = segment_parameters(A[0], A[1], B[0], B[1])
     x, y, n = np.empty(3), np.empty(3), np.empty(3)
     for i in range(3):
@@ -168,14 +199,24 @@ def _write_row(
         norm = max(np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2), _TOUCHING)
     for i in range(3):
         n[i] /= norm
-    moves_a = capsules.moves[capsules.joint[a]]
-    moves_b = capsules.moves[capsules.joint[b]]
-    for col in range(out.shape[0]):
-        side = moves_a[col] - moves_b[col]
-        if side != 0.0:
-            z = x if side > 0.0 else y
-            speed = speed_along(robot.jacobian[col], n, z[0], z[1], z[2])
-            out[col] = -side * speed
+    joints, first, second = robot.joints, a.joint, b.joint
+    while first != second:  # up to the joint that moves both
+        if first > second:  # parents have smaller numbers
+            write_approach(robot, first, x, n, -1.0, out)
+            first = joints[first].parent
+        else:
+            write_approach(robot, second, y, n, 1.0, out)
+            second = joints[second].parent
+
+
+@inner
+def write_approach(
+    robot: RobotArrays, joint: int, x: Vector, n: Vector, sign: float, out: Vector
+) -> None:
+    """Write the speed of a point x along n, times a sign, per unit of a joint's v."""
+    columns, own = robot.jacobian, robot.joints[joint]
+    for col in range(own.v_start, own.v_start + own.v_count):
+        out[col] = sign * speed_along(columns[col], n, x[0], x[1], x[2])
 
 
 @inner
@@ -199,7 +240,7 @@ def greatest_approach(left: float, rate: float, braking: float, dt: float) -> fl
     return min(max(speed, -SEPARATION) * dt, UNBOUNDED)
 
 
-@compiled
+@inner
 def segment_parameters(
     p0: Vector, p1: Vector, q0: Vector, q1: Vector
 ) -> tuple[float, float]:

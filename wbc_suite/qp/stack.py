@@ -16,22 +16,27 @@ from wbc_suite.qp.escape import Escape
 from wbc_suite.qp.fallback import LevelSolver
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
-from wbc_suite.qp.kernel import Kernel, log_python_parts
 from wbc_suite.qp.level import Level, by_level, tick_layout
 from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, unlimited_bounds
-from wbc_suite.qp.overshoot import OvershootArrays
+from wbc_suite.qp.part import (
+    MAX_LEVELS,
+    STATE,
+    Kernels,
+    Numbers,
+    log_python_parts,
+)
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import TaskReport, TickRecord
 from wbc_suite.qp.solution import Fallback, Solution
 from wbc_suite.qp.solver import make_solver
-from wbc_suite.qp.strict_level import MAX_LEVELS
 from wbc_suite.qp.task import Task
+from wbc_suite.qp.task_rows import PartArrays
 from wbc_suite.qp.tick import (
     TOLERANCE,
+    Taken,
     TickArrays,
     TickStatus,
     bind_kernels,
-    finish_level,
     solve_tick,
 )
 from wbc_suite.typing import Indices, Matrix, Records, Vector
@@ -69,7 +74,7 @@ class TaskStack:
         damping: Tikhonov term, [cost]^2/rad^2. 1e-3 removes the flutter at singular
             postures and does not move the point of rest.
         curvature_damping: Factor of a damping that follows the tasks' errors, see
-            `task_kernels.write_tasks`: it keeps targets that cannot be reached from
+            `task_rows.write_tasks`: it keeps targets that cannot be reached from
             making the robot flutter, and vanishes at targets that can. 0 is without.
         escape: Whether the stack may lead the robot out of postures from which no small
             step leads nearer to a frame's target; see `escape`.
@@ -119,24 +124,27 @@ class TaskStack:
                 limit.apply(configuration, self.bounds)
         qp = make_solver(solver)
         rows = self._constraints = Constraints(configuration, limits, self.equalities)
+        for task in self.tasks:
+            task.bind(configuration)
+        parts = [*self.tasks, *self.equalities]
+        numbers = Numbers(parts, [part.own(configuration) for part in parts])
+        kernels = Kernels()
         self._layout = tick_layout(configuration, tasks, rows)
         self._buffer: Vector = np.zeros(self._layout.dtype.itemsize // 8)
         results = self._layout.results(self._buffer)
         self.levels = [
-            Level(configuration, own, self._layout, results, k=k)
+            Level(configuration, own, self._layout, results, kernels, numbers, k=k)
             for k, own in enumerate(by_level(tasks))
         ]
         rows.fill_constants(self.levels[0].qp)
-        self._warm = solver == "daqp" if warm is None else warm
+        self._numbers = numbers  # targets follow their tasks as long as it exists
+        self._tick = self._make_arrays(results, kernels, numbers, warm=warm)
         own = [part for x in (rows, *self.levels) for part in x.python_parts]
         self.is_compiled = not own
+        self._state["alone"] = self._state["prepared"] = self.is_compiled
         log_python_parts(own)
-        self._tick = self._make_arrays(results)
         self.v_previous: Vector = self._tick.v
-        past = self._overshoot.damping
-        self._level_solver = LevelSolver(
-            configuration.q, self.levels, self._tick, qp, past
-        )
+        self._level_solver = LevelSolver(configuration.q, self.levels, self._tick, qp)
         self.arrays = as_argument(self._tick)
         frames = [t for t in tasks if isinstance(t, FrameTask)]
         self._escape: Escape | None = None
@@ -145,53 +153,46 @@ class TaskStack:
         self._is_alone = self._escape is None and self.is_compiled
         self._last: Solution | None = None
 
-    def _make_arrays(self, results: Records) -> TickArrays:
+    def _make_arrays(
+        self, results: Records, kernels: Kernels, numbers: Numbers, *, warm: bool | None
+    ) -> TickArrays:
         """Gather what the kernel reads and writes."""
-        rows, nv = self._constraints, self.configuration.nv
-        targets = [level.tasks.target.size for level in self.levels]
-        targets += [level.tasks.joint_target.size for level in self.levels]
-        targets.append(rows.held_arrays.target.size)
-        self._overshoot = OvershootArrays(
-            damping=results["overshoot_damping"],
-            before=results["before"],
-            targets=np.zeros(sum(targets)),
-            at_rest=np.zeros(1),
-        )
+        rows, robot = self._constraints, self.configuration.robot
+        records, own = rows.records(self.configuration, kernels, numbers)
+        state = self._state = results["state"].view(STATE)
+        state["levels"], state["damping"] = len(self.levels), self.damping
+        state["curvature"] = self.curvature_damping
+        state["warm"] = self.solver == "daqp" if warm is None else warm
+        addresses = kernels.addresses(robot)
         levels = tuple(as_argument(level.arrays) for level in self.levels)
-        all_levels = (*levels, *levels[-1:] * (MAX_LEVELS - len(levels)))
+        levels += levels[-1:] * (MAX_LEVELS - len(levels))
+        parts = PartArrays(
+            robot=robot,
+            kernels=addresses,
+            own=tuple(own),
+            rows=records,
+            state=state,
+            x=results["x"],
+            levels=levels,
+        )
+        kernels_of_tick = bind_kernels(
+            robot,
+            as_argument(parts),
+            levels[0],
+            as_argument(self.levels[0].qp),
+            has_rows=len(records) > 0,
+            is_strict=len(self.levels) > 1,
+        )
         return TickArrays(
-            kernels=bind_kernels(
-                self.configuration.robot,
-                self.levels[0].arrays,
-                all_levels,
-                rows,
-                strict=len(levels) > 1,
-            ),
-            robot=self.configuration.robot,
-            levels=all_levels,
-            level_count=len(levels),
-            bounds=self.bounds,
-            kinds=np.zeros(2 * nv, dtype=np.int64),
+            **kernels_of_tick,
+            robot=robot,
+            parts=parts,
+            bounds=np.asarray(self.bounds),
+            kinds=np.zeros(2 * self.configuration.nv, dtype=np.int64),
             v=results["v"],
             x=results["x"],
-            residual=results["residual"],
-            all_finite=results["all_finite"],
-            solved=np.zeros(1, dtype=np.int64),
-            relax_speed=rows.relax_speed,
-            pressure_damping=np.zeros(1),
-            overshoot=as_argument(self._overshoot),
-            held=rows.held,
-            rate=rows.rate,
-            capsules=rows.collision.argument,
-            collision_rows=rows.collision_rows,
-            spheres=rows.floor.argument,
-            floor_rows=rows.floor_rows,
-            obstacles=rows.obstacles.argument,
-            obstacle_rows=rows.obstacle_rows,
-            prepared=np.full(2, int(self.is_compiled), dtype=np.int64),
-            damping=float(self.damping),
-            curvature=float(self.curvature_damping),
-            warm=bool(self._warm),
+            before=results["before"],
+            targets=np.zeros(len(numbers.values)),
         )
 
     def reset(self, v: Vector | None = None) -> None:
@@ -204,28 +205,35 @@ class TaskStack:
         for part in (self._level_solver, *self.levels, self._constraints, self._escape):
             if part is not None:
                 part.reset()
-        self._tick.pressure_damping[:] = 0.0
-        for values in self._overshoot:
+        for values in self._past:
             values[:] = 0.0
         self._last = None
 
     @property
     def memory(self) -> tuple[NDArray[Any], ...]:
         """What a tick leaves for the next one, as views; all else is set before it."""
-        tick, levels = self._tick, self.levels
-        held = self._constraints.held_arrays.target
-        past = [x for level in levels for x in (level.qp.side, level.tasks.mu)]
+        past = [x for level in self.levels for x in (level.qp.side, level.qp.mu)]
         limits = [x for limit in self._limits for x in getattr(limit, "memory", ())]
-        own = tick.v, *past, tick.pressure_damping, *self._overshoot, held
-        return *own, *limits
+        return self._tick.v, *past, *self._past, self._numbers.values, *limits
+
+    @property
+    def _past(self) -> tuple[NDArray[Any], ...]:
+        """Damping of earlier ticks, and what it follows from."""
+        names = "pressure_damping", "overshoot_damping", "at_rest"
+        state, tick = self._state, self._tick
+        return *(state[name] for name in names), tick.before, tick.targets
+
+    def target_of(self, task: Task) -> int:
+        """Return the first number of a task's target, as compiled loops write it."""
+        return self._numbers.of(task)[1] - task.target_row.values.size
 
     def prepare(self, dt: float) -> None:
         """Evaluate tasks, limits and equalities that have no kernel."""
         if not self.is_compiled:
             for level in self.levels:
-                level.evaluate(self.configuration, Kernel.PYTHON)
+                level.evaluate(self.configuration)
             self._constraints.prepare(self.configuration, dt, self.levels[0].qp)
-        self._tick.prepared[0] = 1
+        self._state["prepared"] = 1
 
     def solve(self, dt: float) -> Solution:
         """Return the step from the present configuration, which takes dt seconds.
@@ -241,7 +249,7 @@ class TaskStack:
                 if self._escape is not None:
                     self._escape.update(dt)
                 self.prepare(dt)
-            self._tick.prepared[0] = 1
+            self._state["prepared"] = 1
         status, k = solve_tick(self.arrays, dt, 0)
         if status == _SOLVED:
             self._last = self._read(Fallback.NONE)
@@ -259,14 +267,14 @@ class TaskStack:
             status, k = solve_tick(self.arrays, dt, 0)
         while status != TickStatus.SOLVED:
             if status == TickStatus.BAD_POSITION:
-                self._tick.x[:] = self._tick.v[:] = self._tick.residual[:] = 0.0
+                self._tick.x[:] = self._tick.v[:] = 0.0
                 fallback = Fallback.HOLD
                 break
             is_finite = status != TickStatus.BAD_ROWS
             result = self._level_solver.solve_level(k, dt, is_finite=is_finite)
             fallback = max(fallback, result)
-            if result is not Fallback.LEVEL:
-                finish_level(self.arrays, k, dt, result is Fallback.NONE)
+            taken = Taken.BY_PYTHON if result is Fallback.NONE else Taken.RELAXED
+            self._state["taken"] = Taken.NOT if result is Fallback.LEVEL else taken
             if result is Fallback.LEVEL or result >= Fallback.BOX:
                 k = len(self.levels) - 1  # the levels below are left out
             status, k = solve_tick(self.arrays, dt, k + 1)
@@ -289,7 +297,7 @@ class TaskStack:
     def _read(self, fallback: Fallback) -> Solution:
         """Copy the step and what explains it."""
         tick, nv = self._tick, self.configuration.nv
-        values, solved = self._buffer.copy(), int(tick.solved[0])
+        values, solved = self._buffer.copy(), int(self._state["solved"][0])
         held: tuple[tuple[str, ...], ...] = ((),) * solved
         if not values[2 * nv + 1]:
             held = tuple(level.held() for level in self.levels[:solved])
@@ -333,7 +341,7 @@ class TaskStack:
 
     def pressed(self) -> Indices:
         """Return the velocity indices pressed against position limits last tick."""
-        if not self._tick.solved[0]:
+        if not self._state["solved"][0]:
             return np.zeros(0, dtype=np.int64)
         multipliers = self.levels[0].qp.multipliers[: self.configuration.nv]
         lower, upper = self._tick.kinds.reshape(2, -1) == LimitKind.POSITION

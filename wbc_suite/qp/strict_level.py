@@ -1,45 +1,28 @@
 """Strict priorities: what the levels above leave to a level."""
 
-from typing import NamedTuple
+import numpy as np
 
-from wbc_suite.compiling import compiled_inline, inner, struct
+from wbc_suite.compiling import inner
 from wbc_suite.linear_algebra import copy_rows, dot, row_space, subtract_projection
-from wbc_suite.qp.active_set import QpArrays
 from wbc_suite.qp.problem import UNBOUNDED
-from wbc_suite.qp.task_kernels import TaskArrays
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.qp.task_rows import LevelArrays, PartArrays
+from wbc_suite.typing import Matrix
 
-MAX_LEVELS = 6  # of a stack
 _LOST_DIRECTION = 0.05  # share of a unit vector outside the present basis
 _SINGULAR = 2e-2  # shortest over longest row, under which a singularity is near
 _RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
 
 
-@struct
-class LevelArrays(NamedTuple):
-    """One strict level.
-
-    Below level 0, equality rows of the problem are an orthonormal basis of what the
-    levels above decide.
-    """
-
-    tasks: TaskArrays
-    qp: QpArrays
-    above: Matrix  # (m, nv), scratch: rows of all levels above and of the equalities
-    lengths: Vector  # (nv,), scratch of `row_space`
-    kept: Matrix  # (nv, nv), the basis of the last tick
-    kept_counts: Indices  # (2,), its size, and the greatest rank so far
-
-
 @inner
-def restrict_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
+def restrict_level(parts: PartArrays, k: int, dt: float) -> bool:
     """State that level k may move in ways that all levels above rate like their step.
 
     Those are `V dq = V x`, where V is an orthonormal basis of the equality rows and of
     all rows above. x, the step of the level above, is one of them, so the problem has a
-    solution.
+    solution. Return True.
     """
-    level, first, nv = levels[k], levels[0].qp, x.shape[0]
+    levels, x, nv = parts.levels, parts.x, parts.x.shape[0]
+    level, first = levels[k], levels[0].qp
     qp, p, count = level.qp, first.counts[0], first.counts[1]
     above, rows = level.above, qp.rows
     copy_rows(first.rows[p : p + count], above)
@@ -56,9 +39,10 @@ def restrict_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
         y = dot(rows[row], x, nv)
         qp.upper[nv + row] = max(first.wanted[row], y) if row < p else y
         qp.lower[nv + row] = -UNBOUNDED if row < p else y
+    return True
 
 
-@compiled_inline
+@inner
 def _decided_directions(rows: Matrix, V: Matrix, level: LevelArrays) -> int:
     """Write an orthonormal basis of what the levels above decide; return its size.
 
@@ -67,7 +51,7 @@ def _decided_directions(rows: Matrix, V: Matrix, level: LevelArrays) -> int:
     again, at full acceleration. So until the singularity is left, what was theirs at
     the last tick stays theirs. Their rows are destroyed.
     """
-    kept, counts, lengths = level.kept, level.kept_counts, level.lengths
+    kept, counts, lengths = level.kept, level.kept_counts, np.empty(V.shape[1])
     rank = row_space(rows, _RANK_TOLERANCE, V, lengths)
     counts[1] = max(counts[1], rank)
     clear = rank == counts[1]

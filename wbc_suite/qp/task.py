@@ -1,58 +1,27 @@
 """What every QP task has in common."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar, TypeAlias
-from weakref import ref
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from wbc_suite.arguments import check_array, check_count, check_number
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.limit import joint_values
+from wbc_suite.qp.part import SharedRow, run_kernel
 from wbc_suite.typing import Indices, Matrix, Vector
 
 
-class SharedRow:
-    """A target or costs, with a copy in every stack that holds the task.
-
-    Attributes:
-        values: The values, zero until they are `set`.
-        is_set: Whether they are.
-    """
-
-    def __init__(self, size: int) -> None:
-        self.values: Vector = np.zeros(size)
-        self.is_set = False
-        self._copies: list[ref[Vector]] = []
-
-    def set(self, values: Vector) -> None:
-        """Set the values, and those of all copies."""
-        self.values[:] = values
-        self.is_set = True
-        for copy in self._copies:
-            row = copy()
-            if row is not None:
-                row[:] = values
-
-    def attach(self, copy: Vector) -> None:
-        """Keep an array equal to the values as long as it exists."""
-        copy[:] = self.values
-        self._copies = [other for other in self._copies if other() is not None]
-        self._copies.append(ref(copy))
-
-
-class RowTask(ABC):
+class RowTask:
     """One term `|| W (J dq - gain e) ||^2` of a stack's cost, with a few dense rows.
 
     `e` is the task's error and `J` its derivative: `d(e) = -J dq`. The wanted step
     `gain e` is shortened to the task's greatest speed, because errors without bound
     are what makes joints flip at limits. `W` is the diagonal of costs.
 
-    A subclass writes `evaluate`, as the guide of QP stacks shows; weights, saturation,
-    damping and reports are the stack's work.
+    A subclass writes `evaluate`, or names a `kernel` and its numbers, as the guide of
+    QP stacks shows; weights, saturation, damping and reports are the stack's work.
 
     Args:
         name: How reports call the task.
@@ -66,16 +35,16 @@ class RowTask(ABC):
         angular_start: First row that is an angle; `dim` when absent.
 
     Attributes:
-        kernel: What computes error and Jacobian. Subclasses inherit it, unless they
-            override `evaluate`; see `kernel_of`.
-        target_row: Target of a task with a kernel, as the kernel reads it.
+        kernel: What computes Jacobian and error, see `part`. Subclasses inherit it,
+            unless they override `evaluate`; see `part.kernel_of`.
+        target_row: Target of a task with a kernel, which follows `set` at once.
         unit: Unit of the rows before `angular_start`, for reports.
 
     Raises:
         ConfigError: If a cost, the gain, the level or a speed is out of range.
     """
 
-    kernel: ClassVar[Kernel] = Kernel.PYTHON
+    kernel: ClassVar[Any] = None
     unit: str = "m"
 
     def __init__(
@@ -103,27 +72,31 @@ class RowTask(ABC):
         """Cost of each row, [cost] per unit of the error, shape (dim,). A view."""
         return self.cost_row.values
 
-    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
+    def bind(self, configuration: Configuration) -> None:
         """Resolve names in a model. A stack calls it once.
 
         Raises:
             UnknownNameError: If the model lacks a frame or joint of this task.
         """
 
-    @abstractmethod
+    def support(self, configuration: Configuration) -> Indices:
+        """Return the velocity indices whose columns of J may differ from zero."""
+        return np.arange(configuration.nv)
+
+    def own(self, configuration: Configuration) -> Vector:
+        """Return the numbers that the kernel reads; they end with `target_row`."""
+        return self.target_row.values.copy()
+
     def evaluate(
         self, configuration: Configuration, error: Vector, jacobian: Matrix
     ) -> None:
         """Write the error, shape (dim,), and J, `d(error) = -J dq`, shape (dim, nv).
 
         An error that is not finite, or beyond 1e9, holds what the task controls, and is
-        reported. J is finite in any case; it is zero before the first call, and keeps
-        columns outside the support.
+        reported. J is finite in any case; it is zero before the first call.
         """
-
-    def support(self, configuration: Configuration) -> Indices:
-        """Return the velocity indices whose columns may differ from zero."""
-        return np.arange(configuration.nv)
+        own = self.own(configuration)
+        run_kernel(self, configuration.robot, own, 0.0, jacobian, error)
 
     def error(self, configuration: Configuration) -> Vector:
         """Return the error, shape (dim,); NaN for a target that is not finite."""
@@ -139,7 +112,7 @@ class RowTask(ABC):
         return error, jacobian
 
 
-class JointTask(ABC):
+class JointTask:
     """A term of a stack's cost whose Jacobian is the identity: one row per velocity.
 
     Other arguments and attributes are those of `RowTask`.
@@ -154,7 +127,7 @@ class JointTask(ABC):
         squared_costs: Squared cost of each velocity once bound, shape (nv,).
     """
 
-    kernel: ClassVar[Kernel] = Kernel.PYTHON
+    kernel: ClassVar[Any] = None
 
     def __init__(
         self,
@@ -177,12 +150,17 @@ class JointTask(ABC):
         """Resolve joint names."""
         self.squared_costs = joint_values(configuration, self.cost, self.costs) ** 2
 
-    @abstractmethod
+    def own(self, configuration: Configuration) -> Vector:
+        """Return the numbers that the kernel reads; they end with `target_row`."""
+        return self.target_row.values.copy()
+
     def evaluate(self, configuration: Configuration, error: Vector) -> None:
         """Write the error of each velocity, shape (nv,).
 
         Values that are not finite hold all joints of the task, and are reported.
         """
+        own, none = self.own(configuration), np.zeros((0, configuration.nv))
+        run_kernel(self, configuration.robot, own, 0.0, none, error)
 
     def error(self, configuration: Configuration) -> Vector:
         """Return the error of each velocity, rad or m, shape (nv,)."""

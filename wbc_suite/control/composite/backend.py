@@ -40,13 +40,13 @@ class StackArrays(NamedTuple):
 
     Attributes:
         qp: The argument of `solve_tick`.
-        levels: Place of each frame's task among the strict levels, then the posture's,
-            shape (n + 1,).
+        target: First number of the target of each frame's task, then of the posture's,
+            see `TaskStack.target_of`, shape (n + 1,).
         motors: The argument of `motors_suffice`.
     """
 
     qp: TickArrays
-    levels: Indices
+    target: Indices
     motors: TorqueArrays
 
 

@@ -3,8 +3,8 @@
 from wbc_suite.compiling import compiled, inner
 from wbc_suite.control.loop.records import Drives
 from wbc_suite.control.part.spline_reference import SplineArrays, spline_end
-from wbc_suite.qp.limit import JointBounds, braking_step
-from wbc_suite.typing import Vector
+from wbc_suite.qp.limit import braking_step
+from wbc_suite.typing import CompiledRecords, Vector
 
 MAX_LEAD = 0.25
 """rad or m; a command waits for a joint that lags behind by more, so that a joint does
@@ -17,7 +17,7 @@ EXCESS = 1.2
 
 @compiled
 def limit_steps(
-    bounds: JointBounds,
+    bounds: CompiledRecords,
     spline: SplineArrays,
     v: Vector,
     drives: Drives,
@@ -32,7 +32,7 @@ def limit_steps(
 
 @inner
 def _limit_lead(
-    bounds: JointBounds,
+    bounds: CompiledRecords,
     spline: SplineArrays,
     v: Vector,
     drives: Drives,
@@ -53,21 +53,23 @@ def _limit_lead(
         drive, i = drives[j], spline.v_index[j]
         position, velocity = spline_end(spline, j)
         most, growth = drive.windup_max, velocity - qvel[drive.dof]
-        lag, v_max = float(position - qpos[drive.qpos]), float(bounds.v_max[i])
+        lag, v_max = float(position - qpos[drive.qpos]), float(bounds[i].v_max)
         excess = max(excess, abs(float(qvel[drive.dof])) / v_max, abs(lag) / MAX_LEAD)
         lead = lag + drive.kd / drive.kp * growth
-        kept, a_max = dt * (v[i] - growth), float(bounds.a_max[i])
+        kept, a_max = dt * (v[i] - growth), float(bounds[i].a_max)
         for side, sign in enumerate((-1.0, 1.0)):
             left = max(most - sign * lead, 0.0)
             longer = braking_step(float(left), 1.0, a_max, dt)
             slower = min(sign * v[i] * dt - a_max * dt**2, 0.0)
             least = slower if sign * lead > MAX_LEAD else 0.0
-            bounds.step_max[side, i] = max(sign * kept + longer, least)
+            bounds[i].step_max[side] = max(sign * kept + longer, least)
     return excess
 
 
 @inner
-def _brake(bounds: JointBounds, spline: SplineArrays, v: Vector, share: float) -> None:
+def _brake(
+    bounds: CompiledRecords, spline: SplineArrays, v: Vector, share: float
+) -> None:
     """Brake all commands by a share of their greatest accelerations.
 
     A contact drives a joint: an arm presses its wrist down, or a base drives on with
@@ -75,7 +77,8 @@ def _brake(bounds: JointBounds, spline: SplineArrays, v: Vector, share: float) -
     """
     dt = spline.period
     for i in spline.v_index:
+        step_max, window = bounds[i].step_max, share * bounds[i].a_max * dt**2
         for side, sign in enumerate((-1.0, 1.0)):
-            slower = sign * v[i] * dt - share * bounds.a_max[i] * dt**2
-            longest = max(slower, -bounds.step_max[1 - side, i], 0.0)
-            bounds.step_max[side, i] = min(bounds.step_max[side, i], longest)
+            slower = sign * v[i] * dt - window
+            longest = max(slower, -step_max[1 - side], 0.0)
+            step_max[side] = min(step_max[side], longest)

@@ -62,8 +62,9 @@ class CommandedScene:
         self.data = mujoco.MjData(state.model)
         model, data = self.model, self.data
         arrays, names = configuration.arrays, configuration.model.names
-        kinds = range(JointKind.REVOLUTE_X, JointKind.FREE)
-        joints = [k for k in range(1, len(names)) if arrays.kind[k] in kinds]
+        kinds = JointKind.REVOLUTE, JointKind.PRISMATIC
+        known = arrays.joints["kind"].tolist()
+        joints = [k for k in range(1, len(names)) if known[k] in kinds]
         ids = [model.joint(state.prefix + names[k]).id for k in joints]
         self.argument = as_argument(
             CommandedArrays(
@@ -75,7 +76,7 @@ class CommandedScene:
                 measured_mocap_pos=measured.mocap_pos,
                 measured_mocap_quat=measured.mocap_quat,
                 q=arrays.q,
-                joint=arrays.q_start[joints].astype(np.int64),
+                joint=arrays.joints["q_start"][joints].astype(np.int64),
                 place=model.jnt_qposadr[ids].astype(np.int64),
             )
         )

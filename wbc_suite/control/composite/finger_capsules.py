@@ -9,7 +9,8 @@ from wbc_suite.control.composite.commanded_scene import CommandedScene, joint_bo
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import SelfCollisionLimit
-from wbc_suite.typing import Indices, Matrix
+from wbc_suite.qp.self_collision_rows import CAPSULE
+from wbc_suite.typing import CompiledRecords, Indices, Matrix
 
 
 @struct
@@ -21,7 +22,7 @@ class FingerArrays(NamedTuple):
         body: Body of its link.
         carrier: Body of the joint that moves it in the reduced robot.
         local: Ends of its segment in its link, m, shape (n, 6).
-        ends: Ends of all capsules in their joints, m; those of the limit.
+        capsules: `CAPSULE` records of all capsules; those of the limit.
         xpos: Positions of bodies of the commanded scene, m, shape (nbody, 3).
         xmat: Their orientations, shape (nbody, 9).
     """
@@ -30,7 +31,7 @@ class FingerArrays(NamedTuple):
     body: Indices
     carrier: Indices
     local: Matrix
-    ends: Matrix
+    capsules: CompiledRecords
     xpos: Matrix
     xmat: Matrix
 
@@ -58,11 +59,11 @@ class FingerCapsules:
         commanded: CommandedScene,
         limit: SelfCollisionLimit | None,
     ) -> None:
-        capsules, joint, ends = (), np.zeros(0, np.int64), np.zeros((0, 6))
+        capsules, placed = (), np.zeros(0, CAPSULE)
         if limit is not None:
             limit.bind(configuration)
-            capsules, joint = limit.capsules, limit.arrays.joint
-            ends = limit.arrays.ends
+            capsules, placed = limit.capsules, limit.placed
+        joint = placed["joint"]
         model, data = state.model, commanded.data
         names = [state.prefix + capsule.link for capsule in capsules]
         body = np.array([model.body(name).id for name in names], dtype=np.int64)
@@ -75,7 +76,7 @@ class FingerCapsules:
             body=body[moved],
             carrier=carrier[moved],
             local=np.reshape(local, (len(moved), 6)),
-            ends=ends,
+            capsules=placed,
             xpos=data.xpos,
             xmat=data.xmat,
         )
@@ -93,13 +94,14 @@ def place_fingers(fingers: FingerArrays) -> None:
     for k in range(fingers.capsule.shape[0]):
         row, b, c = fingers.capsule[k], fingers.body[k], fingers.carrier[k]
         R_b, R_c = fingers.xmat[b], fingers.xmat[c]
-        for end in (0, 3):
-            x = fingers.local[k, end : end + 3]
+        ends = fingers.capsules[row].ends
+        for end in range(2):
+            x = fingers.local[k, 3 * end : 3 * end + 3]
             for i in range(3):
                 way[i] = xpos[b, i] - xpos[c, i]
                 for j in range(3):
                     way[i] += R_b[3 * i + j] * x[j]
             for i in range(3):
-                fingers.ends[row, end + i] = 0.0
+                ends[end, i] = 0.0
                 for j in range(3):
-                    fingers.ends[row, end + i] += R_c[3 * j + i] * way[j]
+                    ends[end, i] += R_c[3 * j + i] * way[j]

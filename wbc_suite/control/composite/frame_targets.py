@@ -174,10 +174,11 @@ def _write_posture_target(
 ) -> None:
     """Write the next posture; every joint moves by itself."""
     copy_vector(robot.q, posture.target)
-    for j in range(1, robot.kind.shape[0]):
-        if robot.kind[j] == JointKind.FREE:
+    for j in range(1, robot.joints.shape[0]):
+        joint = robot.joints[j]
+        if joint.kind == JointKind.FREE:
             continue
-        q, v = robot.q_start[j], robot.v_start[j]
+        q, v = joint.q_start, joint.v_start
         difference = float(posture.goal[q] - robot.q[q])
         max_speed = float(rate * posture.max_speed[v])
         braking = float(posture.braking[v])

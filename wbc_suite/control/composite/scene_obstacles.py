@@ -19,10 +19,9 @@ from wbc_suite.control.loop.mujoco_functions import geom_distance
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import LinkPair, ObstacleLimit
-from wbc_suite.qp.obstacle_limit import ObstacleArrays
 from wbc_suite.qp.self_collision_rows import insert_nearest
 from wbc_suite.robot import RobotDescription
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import CompiledRecords, Indices, Matrix, Vector
 
 INFLUENCE = 0.5
 """m; pairs further apart are left out: at 4 m/s^2 a hand stops from 2 m/s in it."""
@@ -63,6 +62,7 @@ class SceneArrays(NamedTuple):
         normal: Last normal of each pair, shape (p, 3).
         segment: Nearest points of a pair, of obstacle and robot, m, shape (6,).
         correction: Pose of measured in commanded axes, [R p], shape (12,).
+        planes: `PLANE` records of the obstacle limit, shape (k,).
     """
 
     commanded: CommandedArrays
@@ -84,7 +84,7 @@ class SceneArrays(NamedTuple):
     normal: Matrix
     segment: Vector
     correction: Vector
-    limit: ObstacleArrays
+    planes: CompiledRecords
 
 
 class SceneObstacles:
@@ -142,7 +142,7 @@ class SceneObstacles:
             geom_rbound=model.geom_rbound,
             obstacle=self._pairs[:, 0].copy(),
             geom=self._pairs[:, 1].copy(),
-            body=bodies[self.limit.arrays.joint],
+            body=bodies[self.limit.joints],
             centre=model.geom_aabb[:, :3].copy(),
             half=model.geom_aabb[:, 3:].copy(),
             root=model.body_rootid[own].astype(np.int64),
@@ -153,7 +153,7 @@ class SceneObstacles:
             normal=np.zeros((len(pairs), 3)),
             segment=segment,
             correction=correction,
-            limit=self.limit.argument,
+            planes=self.limit.planes,
         )
         self.argument = as_argument(self._arrays)
 
@@ -161,7 +161,7 @@ class SceneObstacles:
         """Do what `measure_obstacles` does, in Python; places the commanded robot."""
         self.commanded.place()
         list_nearest(self.argument)
-        for row, pair in enumerate(self.limit.arrays.found.tolist()):
+        for row, pair in enumerate(self.limit.planes["found"].tolist()):
             if pair >= 0:
                 first, second = self._pairs[pair]
                 distance = mujoco.mj_geomDistance(
@@ -181,7 +181,7 @@ def measure_obstacles(scene: SceneArrays) -> None:
     place_commanded(scene.commanded)
     list_nearest(scene)
     for row in range(scene.bound.shape[0]):
-        pair = scene.limit.found[row]
+        pair = scene.planes[row].found
         if pair >= 0:
             distance = geom_distance(
                 scene.commanded.model,
@@ -197,7 +197,7 @@ def measure_obstacles(scene: SceneArrays) -> None:
 @compiled
 def list_nearest(scene: SceneArrays) -> None:
     """List the pairs whose boxes are nearest, and within the influence."""
-    found, bound, count = scene.limit.found, scene.bound, 0
+    found, bound, count = scene.planes["found"], scene.bound, 0
     found[:], bound[:] = -1, np.inf
     for pair in range(scene.geom.shape[0]):
         most = min(INFLUENCE, bound[-1])
@@ -245,7 +245,7 @@ def _rows_of_body(scene: SceneArrays, pair: int, count: int) -> tuple[int, int]:
     """Return how many rows a pair's body and obstacle have, and the last of them."""
     kept, last = 0, 0
     for row in range(count):
-        other = scene.limit.found[row]
+        other = scene.planes[row].found
         same_body = scene.body[other] == scene.body[pair]
         if same_body and scene.obstacle[other] == scene.obstacle[pair]:
             kept, last = kept + 1, row
@@ -255,26 +255,27 @@ def _rows_of_body(scene: SceneArrays, pair: int, count: int) -> tuple[int, int]:
 @compiled
 def write_plane(scene: SceneArrays, row: int, distance: float) -> None:
     """Write a row's point and plane, of a measured distance and segment, m."""
-    limit, s, X = scene.limit, scene.segment, scene.correction
-    pair = limit.found[row]
+    plane, s, X = scene.planes[row], scene.segment, scene.correction
+    pair = plane.found
     normal, body = scene.normal[pair], scene.body[pair]
     if abs(distance) > TOUCHING:
         for i in range(3):
             normal[i] = (s[3 + i] - s[i]) / distance
     size = normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2
     if distance >= INFLUENCE or size < 0.5:  # too far, or touching from the start
-        limit.found[row] = -1
+        plane.found = -1
         return
-    limit.plane[row, 3] = SLIDING_TIME * max(sliding_speed(scene, pair) - SLIDING, 0.0)
+    offset = SLIDING_TIME * max(sliding_speed(scene, pair) - SLIDING, 0.0)
     for i in range(3):
-        limit.point[row, i], limit.plane[row, i] = 0.0, 0.0
+        plane.point[i], plane.normal[i] = 0.0, 0.0
         at = X[4 * i + 3]
         for j in range(3):
             from_body = s[3 + j] - scene.xpos[body, j]
-            limit.point[row, i] += scene.xmat[body, 3 * j + i] * from_body
-            limit.plane[row, i] += X[4 * i + j] * normal[j]
+            plane.point[i] += scene.xmat[body, 3 * j + i] * from_body
+            plane.normal[i] += X[4 * i + j] * normal[j]
             at += X[4 * i + j] * s[j]
-        limit.plane[row, 3] += limit.plane[row, i] * at
+        offset += plane.normal[i] * at
+    plane.offset = offset
 
 
 @inner

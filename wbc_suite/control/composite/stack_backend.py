@@ -6,7 +6,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from wbc_suite.compiling import as_argument
 from wbc_suite.control.composite.backend import IkBackend, IkStep, StackArrays
 from wbc_suite.control.composite.command_lead import limit_steps
 from wbc_suite.control.composite.frame_kinds import NO_SPEED_LIMIT, set_target
@@ -149,15 +148,14 @@ class StackBackend(IkBackend):
         self, reference: SplineReference, law: JointLaw, data: mujoco.MjData
     ) -> None:
         """Limit the next step as `command_lead.limit_steps` does."""
-        bounds, spline = as_argument(self.stack.bounds), reference.argument
+        bounds, spline = np.asarray(self.stack.bounds), reference.argument
         drives: Any = law.drives
         limit_steps(bounds, spline, self.v, drives, data.qpos, data.qvel)
 
     def loop_arrays(self) -> StackArrays:
         """Return what ticks in the control loop need."""
         tasks = [*self._tasks, self._posture]
-        levels = sorted({task.level for task in tasks})
-        places = [levels.index(task.level) for task in tasks]
+        places = [self.stack.target_of(task) for task in tasks]
         return StackArrays(
             self.stack.arrays,
             np.array(places, dtype=np.int64),

@@ -78,9 +78,8 @@ class WholeBodyArrays(NamedTuple):
     Attributes:
         state: `TickState`, shape (1,).
         qp: The stack of tasks; its robot is at the commanded configuration.
-        task_level: Strict level of the task of each frame, shape (n,).
-        task_row: Place of the task on its level, shape (n,).
-        posture_level: Strict level of the posture.
+        target: First number of the target of each frame's task among those of the
+            stack, shape (n + 1,); the last is that of the posture.
         spline: References until the next tick.
         v: Velocity of the last tick, shape (nv,).
         joint_law: Index of the law of joints in the loop's table.
@@ -95,9 +94,7 @@ class WholeBodyArrays(NamedTuple):
     posture: PostureArrays
     progress: ProgressArrays
     qp: TickArrays
-    task_level: Indices
-    task_row: Indices
-    posture_level: int
+    target: Indices
     motors: TorqueArrays
     spline: SplineArrays
     v: Vector
@@ -150,14 +147,14 @@ def run_tick(
 @inner
 def _write_task_targets(tick: WholeBodyArrays) -> None:
     """Write the targets of frames and posture into the tasks of the stack."""
-    frames, levels = tick.frames, tick.qp.levels
-    for k in range(frames.joint.shape[0]):
-        found = frames.target[k]
-        target = levels[tick.task_level[k]].tasks.target[tick.task_row[k]]
+    frames, numbers, first = tick.frames, tick.qp.parts.own[0], tick.target
+    count, posture = frames.joint.shape[0], tick.posture.target
+    for k in range(count):
+        found, target = frames.target[k], numbers[first[k] :]
         if frames.joint[k] == CENTRE_OF_MASS:
             for i in range(3):
                 target[i] = found[4 * i + 3]
         else:
             copy_vector(found, target)
-    posture = levels[tick.posture_level].tasks.joint_target[0]
-    copy_vector(tick.posture.target[: posture.shape[0]], posture)
+    nq = tick.qp.robot.q.shape[0]
+    copy_vector(posture[:nq], numbers[first[count] :])

@@ -263,8 +263,6 @@ class WholeBodyIK:
         stack = self._backend.loop_arrays()
         if stack is None:
             return ()
-        levels = stack.levels
-        rows = [int((levels[:k] == levels[k]).sum()) for k in range(len(levels) - 1)]
         tick = WholeBodyArrays(
             state=self._state,
             goals=self._goals.argument,
@@ -274,9 +272,7 @@ class WholeBodyIK:
             posture=self.frames.posture_argument,
             progress=self._planner.argument,
             qp=stack.qp,
-            task_level=levels[:-1].copy(),
-            task_row=np.array(rows, dtype=np.int64),
-            posture_level=int(levels[-1]),
+            target=stack.target,
             motors=stack.motors,
             spline=self._reference.argument,
             v=self._backend.v,

@@ -1,11 +1,8 @@
 """The kernels that the control loop calls by their address: those of its laws."""
 
-import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
-
-from numba import errors
 
 from wbc_suite.compiling import (
     Callback,
@@ -237,9 +234,7 @@ def bind_kernels(
         override=override or address(nothing),
     )
     if compiled:
-        with warnings.catch_warnings():  # a tuple of functions is new in numba
-            warnings.simplefilter("ignore", errors.NumbaExperimentalFeatureWarning)
-            kernels = as_argument(kernels)
+        kernels = as_argument(kernels)
     return argument, kernels, owner
 
 
