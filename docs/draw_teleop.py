@@ -70,7 +70,7 @@ def page_of(robot: str) -> Iterator[tuple[TeleopSession, Page]]:
     env = wbc_suite.make("Lift", robots=robot, control_freq=RATE, horizon=10**7)
     session = TeleopSession(env, period=1.0 / RATE, seed=SEED)
     for limb in session.limbs.values():  # a browser that draws slowly is not gone
-        limb.ownership.timeout = 300.0
+        limb.hold_timeout = 300.0
     session.start()
     page = TeleopPage(session, PageServer(port=0), label=f"{robot} · Lift")
     page.start()

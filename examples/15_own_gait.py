@@ -55,7 +55,7 @@ def main() -> None:
     config = wbc_suite.load_composite_controller_config("WHOLE_BODY_ID", "Spot")
     config |= {"gait": {"type": "amble", "lead": 0.12}}
     env = wbc_suite.make("Stand", robots="Spot", controller_configs=config)
-    env.reset(seed=0)
+    _, info = env.reset(seed=0)
     layout, stand = env.action_layout, env.hold_action
     trunk = env.simulation.data.body("robot0_body")
     start, standing = trunk.xpos.copy(), np.zeros(5, dtype=int)

@@ -54,8 +54,8 @@ def descend(
         dexterity: See `error`.
         most: A cost.
     """
-    tasks, x, left, earlier = tick.levels[0].tasks, tick.x, np.inf, np.inf
-    distances, jacobian = tasks.distances, tasks.jacobian
+    level, x, left, earlier = tick.parts.levels[0], tick.x, np.inf, np.inf
+    distances, jacobian = level.distances, level.jacobian
     for k in range(ITERATIONS + 1):
         if solve_tick(tick, STEP, 0)[0] != _SOLVED:
             break

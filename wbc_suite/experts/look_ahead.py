@@ -59,7 +59,9 @@ class LookAhead:
     def __init__(self, state: RobotState, joints: Sequence[str], *frames: str) -> None:
         self._state, self._frames = state, frames
         model = state.robot.to_pinocchio()
-        kinds = zip(model.names, robot_arrays(model).kind.tolist(), strict=True)
+        kinds = zip(
+            model.names, robot_arrays(model).joints["kind"].tolist(), strict=True
+        )
         moving = {name for name, kind in kinds if kind != JointKind.OTHER} & {*joints}
         locked = [i for i, n in enumerate(model.names) if i and n not in moving]
         self._start = state.q

@@ -79,7 +79,7 @@ class Conversion:
             k = names[prefix + name]
             q0 = int(mujoco_model.jnt_qposadr[k])
             v0 = int(mujoco_model.jnt_dofadr[k])
-            order = _Q_ORDER.get(_PARAMETERS[mujoco_model.jnt_type[k]], [0])
+            order = _Q_ORDER.get(_PARAMETERS[int(mujoco_model.jnt_type[k])], [0])
             if (joint.nq, joint.nv) != (len(order), max(1, len(order) - 1)):
                 raise DescriptionError(
                     f"Joint '{name}' has {joint.nq} parameters and {joint.nv} "

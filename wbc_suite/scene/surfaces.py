@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from pinocchio.utils import rotate
+import pinocchio as pin
 
 from wbc_suite.scene.geom_bounds import box_corners, solid_geoms
 from wbc_suite.typing import Indices, Matrix, Vector
@@ -102,7 +102,7 @@ def free_side(m: mujoco.MjModel, data: mujoco.MjData, top: Surface) -> int | Non
 
 def _has_room(m: mujoco.MjModel, data: mujoco.MjData, top: Surface, k: int) -> bool:
     heading, depth, _ = top.from_side(k)
-    R = rotate("z", heading)
+    R = pin.utils.rotate("z", heading)
     corners = box_corners(m, data, still_geoms(m), top.middle, R)
     edge, floor = -depth / 2, -float(top.middle[2])
     low = np.array([edge - DEPTH, -HALF_WIDTH, floor + FROM])

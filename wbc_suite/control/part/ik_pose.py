@@ -215,6 +215,7 @@ class IkPoseController(PartController[JointLaw]):
             speed=np.array(motion.speed),
             braking=np.array(motion.braking),
             qp=self._stack.arrays,
+            target=self._stack.target_of(self._stack.tasks[0]),
             spline=self._spline.argument,
             law=self.law.index,
             steps=self._steps,

@@ -56,6 +56,7 @@ class HandIk(NamedTuple):
         speed: Greatest speeds, m/s and rad/s, shape (2,).
         braking: Decelerations, m/s^2 and rad/s^2, shape (2,).
         qp: The stack of hand and posture.
+        target: Place of the hand's target among its numbers, [R p], (12,).
         spline: References until the next tick.
         law: Index of the part's law in the loop's table.
         steps: Physics steps between two ticks.
@@ -72,6 +73,7 @@ class HandIk(NamedTuple):
     speed: Vector
     braking: Vector
     qp: TickArrays
+    target: int
     spline: SplineArrays
     law: int
     steps: int
@@ -113,6 +115,6 @@ def _write_target(hand: HandIk, physics: Physics) -> None:
     log3(turn, error[3:])
     for i in range(3):
         error[i] = other[4 * i + 3] - pose[4 * i + 3]
-    target = hand.qp.levels[0].tasks.target[0]
+    target = hand.qp.parts.own[0][hand.target :]
     speed, braking, dt = hand.speed, hand.braking, hand.spline.period
     approach_pose(pose, error, dt, hand.gain, 1.0, speed, braking, target)

@@ -1,7 +1,7 @@
 """Environments: the base of all classes, their registry, and `make`."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, KeysView, Mapping
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,7 @@ from wbc_suite.typing import Vector
 
 REGISTERED_ENVS: dict[str, type["MujocoEnv"]] = {}
 """Classes of environments by name."""
-ALL_ENVIRONMENTS = REGISTERED_ENVS.keys()
+ALL_ENVIRONMENTS: KeysView[str] = REGISTERED_ENVS.keys()
 
 _BASES = ("MujocoEnv", "RobotEnv", "ManipulationEnv", "TwoArmEnv")
 OURS_ALONE: dict[str, type["MujocoEnv"]] = {}

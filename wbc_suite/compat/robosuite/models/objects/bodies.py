@@ -187,12 +187,14 @@ class MujocoXMLObject(MujocoObject, MujocoXML):  # pyright: ignore[reportIncompa
     @property
     def bottom_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - read from the file
         """Offset of its lowest point from its origin, m."""
-        return self._extents.get("bottom_site", super().bottom_offset)
+        site = self._extents.get("bottom_site")
+        return super().bottom_offset if site is None else site
 
     @property
     def top_offset(self) -> Vector:  # pyright: ignore[reportIncompatibleVariableOverride] - read from the file
         """Offset of its highest point from its origin, m."""
-        return self._extents.get("top_site", super().top_offset)
+        site = self._extents.get("top_site")
+        return super().top_offset if site is None else site
 
     def _extent(self) -> Extent:
         return self._measured
