@@ -12,7 +12,7 @@ from wbc_suite.viewers.scene_setup import Colour, css, place
 if TYPE_CHECKING:
     import viser
 
-    from wbc_suite.viewers.page_process import Session
+    from wbc_suite.viewers.remote_session import Session
 
 # Colours: red, green and blue, 0 to 255.
 STANDING, LIFTED, FOOTSTEP = (48, 150, 84), (120, 130, 145), (232, 140, 30)

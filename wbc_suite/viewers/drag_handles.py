@@ -19,7 +19,7 @@ from wbc_suite.viewers.session_state import LimbInfo, LimbStatus, Snapshot
 if TYPE_CHECKING:
     import viser
 
-    from wbc_suite.viewers.page_process import Session
+    from wbc_suite.viewers.remote_session import Session
 
 
 class HandleMode(StrEnum):

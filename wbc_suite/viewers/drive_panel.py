@@ -11,7 +11,7 @@ from wbc_suite.viewers.session_state import Snapshot
 if TYPE_CHECKING:
     import viser
 
-    from wbc_suite.viewers.page_process import Session
+    from wbc_suite.viewers.remote_session import Session
 
 FIRST_SPEED = 50  # per cent of the greatest
 MOVING = 5e-3  # m/s and rad/s; slower is displayed as standing

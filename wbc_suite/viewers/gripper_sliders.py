@@ -11,7 +11,7 @@ from wbc_suite.viewers.session_state import plain
 if TYPE_CHECKING:
     import viser
 
-    from wbc_suite.viewers.page_process import Session
+    from wbc_suite.viewers.remote_session import Session
 
     Slider = viser.GuiSliderHandle[float]
     Event = viser.GuiEvent[Slider]

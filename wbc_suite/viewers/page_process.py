@@ -14,14 +14,13 @@ import multiprocessing
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from wbc_suite import logs
 from wbc_suite.errors import DeviceError
 from wbc_suite.viewers.loop_timing import raise_priority
 
 if TYPE_CHECKING:
-    from wbc_suite.viewers.remote_session import RemoteSession
     from wbc_suite.viewers.teleop_session import TeleopSession
 
 log = logs.logger(__name__)
@@ -158,10 +157,6 @@ def _serve(*arguments: Any) -> None:
     from wbc_suite.viewers.remote_session import serve
 
     serve(*arguments)
-
-
-Session: TypeAlias = "TeleopSession | RemoteSession"
-"""What a page displays and commands. Clients are numbers, one for each open page."""
 
 
 @contextlib.contextmanager

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import mujoco
 
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     import pinocchio as pin
 
     from wbc_suite.viewers.session_state import SessionInfo, Snapshot
+    from wbc_suite.viewers.teleop_session import TeleopSession
+
+Session: TypeAlias = "TeleopSession | RemoteSession"
+"""What a page displays and commands. Clients are numbers, one for each open page."""
 
 PROGRESS_PERIOD = 0.2  # s
 

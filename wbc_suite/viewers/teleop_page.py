@@ -24,7 +24,7 @@ from wbc_suite.viewers.teleop_panel import TeleopPanel
 if TYPE_CHECKING:
     import viser
 
-    from wbc_suite.viewers.page_process import Session
+    from wbc_suite.viewers.remote_session import Session
 
 PANEL_EVERY = 5  # updates
 PLOT_EVERY = 7  # updates; not a multiple, so that both seldom coincide

@@ -3,7 +3,8 @@
 import functools
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Protocol
 
 from wbc_suite.recording.episode_control import EpisodeCommand
 from wbc_suite.viewers.balance_overlay import legend_html
@@ -28,7 +29,12 @@ from wbc_suite.viewers.tracking_plots import TrackingPlots
 if TYPE_CHECKING:
     import viser
 
-    from wbc_suite.viewers.teleop_page import TeleopPage
+    from wbc_suite.viewers.balance_overlay import BalanceOverlays
+    from wbc_suite.viewers.camera_follower import CameraFollower
+    from wbc_suite.viewers.camera_pictures import CameraPictures
+    from wbc_suite.viewers.drag_handles import DragHandles
+    from wbc_suite.viewers.remote_session import Session
+    from wbc_suite.viewers.scene_setup import Box, Colour
 
 RECORD_NOTE = (
     "This session has no file to record into. Start it by "
@@ -51,6 +57,23 @@ RECORD_KEYS = {
 }
 
 
+class Page(Protocol):
+    """What the panel is given of its page; see `TeleopPage`."""
+
+    session: "Session"
+    server: "viser.ViserServer"
+    colours: "MappingProxyType[str, Colour]"
+    handles: "DragHandles"
+    overlays: "BalanceOverlays"
+    pictures: "CameraPictures"
+    cameras: "CameraFollower"
+
+    @property
+    def box(self) -> "Box":
+        """Corners of a box around the robot, m."""
+        ...
+
+
 class TeleopPanel:
     """Status, buttons, limbs, grippers and plots of a page.
 
@@ -58,7 +81,7 @@ class TeleopPanel:
     itself are created when it connects.
     """
 
-    def __init__(self, page: "TeleopPage") -> None:
+    def __init__(self, page: Page) -> None:
         self._page, self._session = page, page.session
         self._gui, session = page.server.gui, page.session
         self._info = info = session.info
