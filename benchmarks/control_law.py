@@ -20,10 +20,10 @@ import mujoco  # isort: skip  (after harness: it sets the number of threads)
 import numba
 
 from wbc_suite.compiling import plain
-from wbc_suite.control.loop.data import LoopData, loop_data
-from wbc_suite.control.loop.inverse_dynamics import write_commands
-from wbc_suite.control.loop.kernels import LoopKernels, bind_kernels
-from wbc_suite.control.loop.records import gather
+from wbc_suite.control.ground.records import gather
+from wbc_suite.control.run.commands import write_commands
+from wbc_suite.control.run.data import LoopData, loop_data
+from wbc_suite.control.run.kernel_table import LoopKernels, bind_kernels
 
 ROBOTS = ("Panda", "Sawyer", "UR5e", "Baxter", "Tiago", "GR1")
 KINDS = ("OSC_POSE", "OSC_POSITION")

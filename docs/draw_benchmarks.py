@@ -9,10 +9,10 @@ from PIL import Image
 import wbc_suite
 from wbc_suite.benchmark import BENCHMARKS, ObjectBenchmark, load_benchmark
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.config_files import read_toml
 from wbc_suite.envs import RobotEnv
 from wbc_suite.evaluation import make_policy
 from wbc_suite.sensing.renderer import make_renderer
-from wbc_suite.tomlfile import read_toml
 from wbc_suite.typing import Matrix
 from wbc_suite.viewers.model_scene import subject_corners
 from wbc_suite.viewers.offscreen import View, fit_camera

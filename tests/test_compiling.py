@@ -122,7 +122,7 @@ def test_a_record_of_a_module_that_is_gone_does_not_spoil_the_cache(tmp_path):
 from typing import NamedTuple
 import numpy as np
 from wbc_suite.compiling import as_argument, struct
-from wbc_suite.control.loop.state_checks import CheckedState
+from wbc_suite.control.run.state_checks import CheckedState
 
 @struct
 class Lost(NamedTuple):
@@ -134,7 +134,7 @@ as_argument(Lost(np.zeros(3)))
     use = """
 import mujoco
 from wbc_suite.compiling import as_argument
-from wbc_suite.control.loop.state_checks import CheckedState, checked_state
+from wbc_suite.control.run.state_checks import CheckedState, checked_state
 model = mujoco.MjSpec().compile()
 as_argument(checked_state(model, mujoco.MjData(model)))
 """

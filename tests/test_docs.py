@@ -18,7 +18,7 @@ import wbc_suite
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-INTERNAL = ("wbc_suite.cli", "wbc_suite.control.loop")
+INTERNAL = ("wbc_suite.cli", "wbc_suite.control.run")
 """Packages whose names are no part of the API."""
 ROBOSUITE = "wbc_suite.compat.robosuite."
 """Its modules have the names of robosuite's, and its documentation."""

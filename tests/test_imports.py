@@ -25,7 +25,7 @@ BASE = (
     "typing",
     "arguments",
     "timing",
-    "tomlfile",
+    "config_files",
     "catalogue",
     "registry",
     "registration",

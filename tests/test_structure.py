@@ -25,7 +25,7 @@ SETTINGS = "FrozenModel"  # pydantic's base with our settings; no level of its o
 MAX_DEPTH = 2  # own classes in a chain of inheritance, foreign bases not counted
 MIN_TESTS = 0.7  # lines of tests for each line of the package
 
-MUJOCO_ADDRESSES = PACKAGE / "control" / "loop" / "mujoco_functions.py"
+MUJOCO_ADDRESSES = PACKAGE / "control" / "ground" / "mujoco_functions.py"
 """The one module that may hold addresses of MuJoCo's functions and structs."""
 COMPILER = PACKAGE / "compiling.py", PACKAGE / "kernel_cache.py"
 """The modules that reach into numba, as far as its manual shows."""

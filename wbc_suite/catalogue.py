@@ -188,7 +188,7 @@ class Catalogue:
         Raises:
             ConfigError: If there is no base of a name, or a file extends itself.
         """
-        from wbc_suite.tomlfile import located  # not at the top: pydantic is slow
+        from wbc_suite.config_files import located  # not at the top: pydantic is slow
 
         chain = [path]
         while (name := base_of(chain[-1])) is not None:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, field_validator
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.scene import Push, PushConfig, draw_pushes
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Array
 
 if TYPE_CHECKING:

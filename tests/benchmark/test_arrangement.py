@@ -10,8 +10,8 @@ from wbc_suite.benchmark.two_arm_lift import TwoArmLiftConfig
 from wbc_suite.benchmark.two_arm_peg_in_hole import TwoArmPegInHoleConfig
 from wbc_suite.benchmark.two_arm_transport import TwoArmTransportConfig
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.config_files import parse_model, read_toml
 from wbc_suite.errors import ConfigError
-from wbc_suite.tomlfile import parse_model, read_toml
 
 PLACES = {"default": (-0.5, 0.1), "UR5e": (-0.7, 0.0)}
 

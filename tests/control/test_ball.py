@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc_suite.control.composite.frame_kinds import FRAME_KINDS
+from wbc_suite.control.ik.frame_kinds import FRAME_KINDS
 
 HANDS = ("right_hand", "left_hand")
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from wbc_suite.compiling import compiled
+from wbc_suite.control.ground.records import LawKind
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import LAWS, Law, law_kernel, law_kind, register_law
-from wbc_suite.control.loop.kernels import bind_kernels
-from wbc_suite.control.loop.records import LawKind
+from wbc_suite.control.run.kernel_table import bind_kernels
 from wbc_suite.envs import Simulation
 from wbc_suite.errors import ConfigError
 

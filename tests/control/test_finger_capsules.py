@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import wbc_suite
-from wbc_suite.control.composite.commanded_scene import CommandedScene
-from wbc_suite.control.composite.finger_capsules import FingerCapsules
+from wbc_suite.control.ik.commanded_scene import CommandedScene
+from wbc_suite.control.ik.finger_capsules import FingerCapsules
 from wbc_suite.kinematics import Configuration
 
 CLOSED = 40  # steps until fingers are closed

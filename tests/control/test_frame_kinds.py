@@ -9,7 +9,7 @@ from wbc_suite.control import (
     SliceKind,
     register_frame_kind,
 )
-from wbc_suite.control.composite.frame_kinds import set_target
+from wbc_suite.control.ik.frame_kinds import set_target
 from wbc_suite.devices.action_ports import LimbKind, limb_ports
 from wbc_suite.errors import ConfigError, UnknownNameError
 
@@ -85,7 +85,7 @@ def test_steps_move_a_goal_in_the_given_axes(name):
 @pytest.mark.parametrize("name", LABELS)
 def test_the_task_costs_the_components_that_count(name):
     kind = FRAME_KINDS[name]
-    config = wbc_suite.control.composite.whole_body_config.ControlledFrame(
+    config = wbc_suite.control.ik.config.ControlledFrame(
         name="a",
         frame="right_tcp" if kind.needs_frame else None,
         kind=name,

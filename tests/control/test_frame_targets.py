@@ -5,12 +5,12 @@ import pinocchio as pin
 import pytest
 from textbook_approach import approach_pose, approach_posture
 
-from wbc_suite.control.composite.frame_targets import (
+from wbc_suite.control.ik.config import WholeBodyIKConfig
+from wbc_suite.control.ik.frame_targets import (
     ControlledFrames,
     posture_step,
     write_targets,
 )
-from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.kinematics import Configuration
 from wbc_suite.robot import load_robot
 

@@ -8,9 +8,13 @@ import pinocchio as pin
 import pytest
 
 from wbc_suite.compiling import plain
-from wbc_suite.control.composite import commanded_scene, progress
-from wbc_suite.control.composite.ik_report import contacts_of
-from wbc_suite.control.composite.progress import (
+from wbc_suite.control.contact import compiled_tick as solve_tick
+from wbc_suite.control.contact import terms
+from wbc_suite.control.ground import acceleration_limits as limits
+from wbc_suite.control.ground.records import LawKind, LawRecord
+from wbc_suite.control.ik import commanded_scene
+from wbc_suite.control.ik import plan_triggers as progress
+from wbc_suite.control.ik.plan_triggers import (
     PROGRESS,
     PROGRESS_TIME,
     PROGRESS_WINDOW,
@@ -23,15 +27,13 @@ from wbc_suite.control.composite.progress import (
     record_state,
     watch_progress,
 )
-from wbc_suite.control.composite.whole_body_dynamics import WholeBodyID
-from wbc_suite.control.dynamics import solve_tick, terms
+from wbc_suite.control.ik.report import contacts_of
 from wbc_suite.control.law import osc
-from wbc_suite.control.loop import acceleration_limits as limits
-from wbc_suite.control.loop import inverse_dynamics
-from wbc_suite.control.loop.records import LawKind, LawRecord
 from wbc_suite.control.part.joint_controllers import JointPositionController
 from wbc_suite.control.part.osc_controller import OscConfig
 from wbc_suite.control.poses import pose_vector
+from wbc_suite.control.run import commands as inverse_dynamics
+from wbc_suite.control.walking.whole_body_id import WholeBodyID
 
 
 def record(**fields):

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from textbook_laws import observe
 
+from wbc_suite.control.ground.acceleration_limits import acceleration_limits
+from wbc_suite.control.ground.physics import bind_physics
 from wbc_suite.control.law.joint_laws import JointLaw
-from wbc_suite.control.loop.acceleration_limits import acceleration_limits
-from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.robot.mjcf_export import LONGEST_STEP, STOP_MARGIN
 
 JOINTS = tuple(f"panda_joint{i}" for i in range(1, 8))

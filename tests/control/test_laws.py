@@ -3,8 +3,8 @@ import pinocchio as pin
 import pytest
 import textbook_approach
 
-from wbc_suite.control.part.approach import approach_pose, approach_speed
-from wbc_suite.control.part.spline_reference import SplineReference, window_length
+from wbc_suite.control.law.approach import approach_pose, approach_speed
+from wbc_suite.control.law.spline_reference import SplineReference, window_length
 from wbc_suite.control.poses import pose_of, row_of, write_turn
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.lie import log3

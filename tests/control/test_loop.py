@@ -9,7 +9,7 @@ import pytest
 
 import wbc_suite
 from wbc_suite.control import BasicController, load_composite_controller_config
-from wbc_suite.control.loop.advance import advance
+from wbc_suite.control.run.advance import advance
 from wbc_suite.envs import Simulation
 
 CASES = [
@@ -177,7 +177,7 @@ def test_sensors_that_are_switched_off_stay_off():
 def test_a_second_process_finds_the_machine_code():
     """Nothing is compiled again: the loop's statistics count hits of the cache."""
     code = (
-        "import wbc_suite; from wbc_suite.control.loop.advance import advance;"
+        "import wbc_suite; from wbc_suite.control.run.advance import advance;"
         "wbc_suite.make('Lift', robots='Panda', controller_configs='BASIC');"
         "hits = sum(advance.stats.cache_hits.values());"
         "print(hits, sum(advance.stats.cache_misses.values()))"

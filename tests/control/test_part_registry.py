@@ -8,6 +8,7 @@ from pydantic import PositiveFloat
 
 import wbc_suite
 from wbc_suite.compiling import compiled
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control import (
     ActionPart,
     PartController,
@@ -22,7 +23,6 @@ from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import LAWS, Law, register_law
 from wbc_suite.control.part.registry import PART_CONTROLLERS, PartControllerName
 from wbc_suite.errors import ConfigError, UnknownNameError
-from wbc_suite.tomlfile import FrozenModel
 
 
 class SwingConfig(PartSettings):

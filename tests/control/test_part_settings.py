@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from wbc_suite.control import PartSettings, SliceKind, Unit
-from wbc_suite.control.part.feasible_acceleration import (
+from wbc_suite.control.ground.feasible_acceleration import (
     LEAST_ACCELERATION,
     feasible_accelerations,
     greatest_loads,

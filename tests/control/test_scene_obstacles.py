@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import wbc_suite
-from wbc_suite.control.composite.scene_obstacles import (
+from wbc_suite.control.ik.scene_obstacles import (
     INFLUENCE,
     ROWS_OF_BODY,
     SceneObstacles,

@@ -8,10 +8,10 @@ import qpsolvers
 from textbook_laws import textbook, write_once
 
 from wbc_suite.control import load_composite_controller_config
-from wbc_suite.control.dynamics.arrays import EDGES
-from wbc_suite.control.dynamics.friction import FOOT_LOAD_MAX, STANCE_FORCE_MIN
-from wbc_suite.control.dynamics.qp_bounds import FORCE_COST, MOTION_COST
-from wbc_suite.control.dynamics.qp_rows import STANCE_FOOT
+from wbc_suite.control.contact.arrays import EDGES
+from wbc_suite.control.contact.friction import FOOT_LOAD_MAX, STANCE_FORCE_MIN
+from wbc_suite.control.contact.qp_bounds import FORCE_COST, MOTION_COST
+from wbc_suite.control.contact.qp_rows import STANCE_FOOT
 from wbc_suite.locomotion.gait import GRAVITY
 
 ROBOTS = ("Spot", "SpotWithArm", "GR1FreeBody")

@@ -2,8 +2,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc_suite.control.composite.reduced_robot import lock_groups
-from wbc_suite.control.composite.torque_limiter import (
+from wbc_suite.control.ik.reduced_robot import lock_groups
+from wbc_suite.control.ik.torque_limiter import (
     CHANGE_SHARE_MIN,
     EFFORT_SHARE,
     TorqueLimiter,

@@ -5,24 +5,24 @@ import pytest
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.config_files import load_model
 from wbc_suite.control import (
     COMPOSITES,
     build_composite_controller,
     load_composite_controller_config,
     register_composite,
 )
-from wbc_suite.control.composite.command_lead import MAX_LEAD
-from wbc_suite.control.composite.ik_report import lagging_joint
-from wbc_suite.control.composite.whole_body_config import (
+from wbc_suite.control.ik.command_lead import MAX_LEAD
+from wbc_suite.control.ik.config import (
     WholeBodyIKConfig,
     default_whole_body_config,
 )
+from wbc_suite.control.ik.report import lagging_joint
 from wbc_suite.control.reasons import TorqueLimit, TrackingError
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.planning import GoalSearch
 from wbc_suite.qp import ActiveLimit, LimitKind
 from wbc_suite.robot import load_robot
-from wbc_suite.tomlfile import load_model
 
 SIDES = ("right", "left")
 

@@ -11,15 +11,15 @@ from textbook_laws import write_once
 import wbc_suite
 from wbc_suite.cli.teleop import default_controller
 from wbc_suite.control import load_composite_controller_config
-from wbc_suite.control.composite.balance_report import FallCause
-from wbc_suite.control.composite.whole_body_dynamics_config import (
+from wbc_suite.control.contact.arrays import EDGES
+from wbc_suite.control.contact.qp_fallback import QpFallback
+from wbc_suite.control.contact.terms import write_frame_terms, write_terms
+from wbc_suite.control.ground.physics import bind_physics
+from wbc_suite.control.reasons import Contact, InMotion
+from wbc_suite.control.walking.config import (
     default_dynamics_config,
 )
-from wbc_suite.control.dynamics.arrays import EDGES
-from wbc_suite.control.dynamics.qp_fallback import QpFallback
-from wbc_suite.control.dynamics.terms import write_frame_terms, write_terms
-from wbc_suite.control.loop.physics import bind_physics
-from wbc_suite.control.reasons import Contact, InMotion
+from wbc_suite.control.walking.report import FallCause
 from wbc_suite.errors import ConfigError
 from wbc_suite.qp import ActiveLimit, OutOfReach
 from wbc_suite.qp.solution import Fallback

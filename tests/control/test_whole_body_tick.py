@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wbc_suite import make
-from wbc_suite.control.composite.whole_body import WholeBodyIK
+from wbc_suite.control.ik.whole_body_ik import WholeBodyIK
 
 
 def made(robot, monkeypatch, *, in_loop):

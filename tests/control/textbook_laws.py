@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.compiling import compiled, plain
+from wbc_suite.control.ground.acceleration_limits import RATE
+from wbc_suite.control.ground.records import LawKind
 from wbc_suite.control.law.osc import LEAST_DAMPING, SINGULAR
 from wbc_suite.control.law.osc_saturation import POSTURE_COST, SHORTENING_COST
-from wbc_suite.control.loop.acceleration_limits import RATE
-from wbc_suite.control.loop.inverse_dynamics import write_commands
-from wbc_suite.control.loop.records import LawKind
+from wbc_suite.control.run.commands import write_commands
 
 UNBOUNDED = 1e30
 
@@ -392,7 +392,7 @@ def observe(state, laws):
 
 
 def _observe(state, laws):
-    """`M (v' - a) - s`, low-passed; see `control.loop.disturbance_observer`."""
+    """`M (v' - a) - s`, low-passed; see `control.run.disturbance_observer`."""
     dt, deviation = state.model.opt.timestep, np.zeros(state.model.nv)
     following = [law for law in laws if law.is_following]
     for law in following:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wbc_suite
-from wbc_suite.control.composite.qp_tasks import accelerations
+from wbc_suite.control.ik.limits_of_config import accelerations
 from wbc_suite.devices import DeviceState, LimbInput, Pipeline, PipelineConfig
 
 RATE = 100.0

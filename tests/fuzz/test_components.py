@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.config_files import parse_model, read_toml
 from wbc_suite.errors import DescriptionError, WbcError
 from wbc_suite.robot.assembly import describe_component
 from wbc_suite.robot.robot_file import Component, reflect_component
-from wbc_suite.tomlfile import parse_model, read_toml
 
 FILES = [
     read_toml(path)

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 import wbc_suite
 from wbc_suite.benchmark import load_benchmark
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.control.composite.whole_body_config import read_whole_body
+from wbc_suite.config_files import read_toml
+from wbc_suite.control.ik.config import read_whole_body
 from wbc_suite.errors import ConfigError, WbcError
 from wbc_suite.scene import empty_arena
-from wbc_suite.tomlfile import read_toml
 
 FILES = [
     path

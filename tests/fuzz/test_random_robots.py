@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wbc_suite.config_files import parse_model
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.qp import FrameTask, PostureTask, TaskStack
 from wbc_suite.robot.assembly import describe_component
 from wbc_suite.robot.robot_file import Component
-from wbc_suite.tomlfile import parse_model
 
 TOLERANCE = 1e-9  # two independent loaders of one robot agree to 1e-13
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import wbc_suite
-from wbc_suite.control.composite.whole_body_config import default_whole_body_config
+from wbc_suite.control.ik.config import default_whole_body_config
 
 FINGERS = ("index", "middle", "ring", "pinky")
 RATIOS = {"thumb_intermediate": 1.6, "thumb_distal": 2.4}  # to the thumb's pitch

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.config_files import read_toml
 from wbc_suite.robot.robot_file import Assembly, Component, robot_schema
-from wbc_suite.tomlfile import read_toml
 
 CATALOGUE = Catalogue()
 FOLDERS = ("robots", "robots/arm", "robots/base", "robots/body", "robots/gripper")

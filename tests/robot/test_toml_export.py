@@ -6,9 +6,9 @@ import pytest
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.config_files import read_toml
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.tomlfile import read_toml
 
 
 def again(robot: RobotDescription, folder: Path) -> RobotDescription:

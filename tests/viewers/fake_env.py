@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control.action import ActionLayout, ActionPart, SliceKind, Unit
-from wbc_suite.control.composite.whole_body_config import ControlledFrame
+from wbc_suite.control.ik.config import ControlledFrame
 from wbc_suite.qp import ActiveLimit, LimitKind
 
 MJCF = """

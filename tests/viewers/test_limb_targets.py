@@ -2,7 +2,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc_suite.control.composite.frame_kinds import FRAME_KINDS as KINDS
+from wbc_suite.control.ik.frame_kinds import FRAME_KINDS as KINDS
 from wbc_suite.devices import PipelineConfig
 from wbc_suite.devices.action_ports import LimbKind, LimbPort
 from wbc_suite.devices.pipeline.limb_pipeline import LimbPipeline

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from wbc_suite.catalogue import Catalogue, merge
+from wbc_suite.config_files import located, parse_model, read_toml
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.registry import Registry
@@ -19,7 +20,6 @@ from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.xml_files import real_path
 from wbc_suite.scene import ArenaConfig, Push, TableConfig
 from wbc_suite.sensing.reading import Reading
-from wbc_suite.tomlfile import located, parse_model, read_toml
 
 C = TypeVar("C", bound=BaseModel)
 Arena: TypeAlias = str | Path | Mapping[str, Any]

@@ -18,6 +18,7 @@ from wbc_suite.benchmark.standing import (
     arrange_on_feet,
 )
 from wbc_suite.benchmark.two_arm_lift import HANDLES, POT, WALL, PotConfig
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.shapes import Vector3
@@ -32,7 +33,6 @@ from wbc_suite.sensing.reading import (
     offset,
     site_position,
 )
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 FROM, TO, FLOOR = "table_from", "table_to", "floor"

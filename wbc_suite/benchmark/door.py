@@ -8,6 +8,7 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control import RobotState
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras, objects
@@ -15,7 +16,6 @@ from wbc_suite.scene.objects import SceneObject
 from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.sensing import reading
 from wbc_suite.sensing.reading import Reading, site_position
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 DOOR = "door"

@@ -13,13 +13,13 @@ from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmar
 from wbc_suite.benchmark.predicates import crossing
 from wbc_suite.benchmark.sorting import Sorting
 from wbc_suite.benchmark.staged_reward import StagedReward
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.robot.shapes import Real, Size
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras, objects
 from wbc_suite.scene.furniture import peg
 from wbc_suite.scene.objects import Part, SceneObject
 from wbc_suite.scene.placement import Region, SequentialSampler, UniformSampler
 from wbc_suite.sensing.reading import Reading
-from wbc_suite.tomlfile import FrozenModel
 
 MAKERS = {"SquareNut": objects.square_nut, "RoundNut": objects.round_nut}
 UP = np.array([0.0, 0.0, 1.0])

@@ -20,6 +20,7 @@ from wbc_suite.benchmark.arrangement import (
 from wbc_suite.benchmark.falls import fall_of
 from wbc_suite.benchmark.predicates import GRIP_ANGLE, Predicates
 from wbc_suite.benchmark.reward_terms import TermConfig
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, PlacementError
 from wbc_suite.robot import RobotDescription
@@ -37,7 +38,6 @@ from wbc_suite.sensing.reading import (
     relative_quat,
     site_position,
 )
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 log = logs.logger(__name__)

@@ -19,13 +19,13 @@ from wbc_suite.benchmark.standing import (
     add_floor_cameras,
     arrange_on_feet,
 )
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Channel
 from wbc_suite.robot.shapes import Interval, Size
 from wbc_suite.scene.objects import ObjectState, Part, SceneObject
 from wbc_suite.sensing.reading import Reading, body_position
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 

@@ -14,10 +14,10 @@ from typing import Any, ClassVar
 
 from pydantic import model_validator
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.errors import UnknownNameError, look_up
 from wbc_suite.registry import Registry
 from wbc_suite.robot.shapes import Real
-from wbc_suite.tomlfile import FrozenModel
 
 REWARD_TERMS: Registry[Callable[..., float]] = Registry("reward term")
 """Functions by name, of the benchmark bound to its scene, and of the table's keys."""

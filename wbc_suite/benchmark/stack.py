@@ -8,13 +8,13 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.robot.elements import Channel
 from wbc_suite.robot.shapes import Size
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras
 from wbc_suite.scene.objects import SceneObject, box
 from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.sensing.reading import Reading, body_position, offset
-from wbc_suite.tomlfile import FrozenModel
 
 A, B = "cubeA", "cubeB"
 

@@ -4,7 +4,7 @@ import math
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.config_files import FrozenModel
 
 
 class StagedReward(FrozenModel):

@@ -9,13 +9,13 @@ from pydantic import Field, PositiveFloat
 
 from wbc_suite.benchmark.arrangement import arrange_one
 from wbc_suite.benchmark.object_benchmark import Places
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.shapes import Interval, SizeInterval
 from wbc_suite.scene import add_camera
 from wbc_suite.sensing.hands import pairs_in_contact
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 FLOOR = "floor"

@@ -11,12 +11,12 @@ from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.predicates import crossing
 from wbc_suite.benchmark.staged_reward import StagedReward
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene import TableConfig, add_camera, add_table, add_table_cameras
 from wbc_suite.scene.objects import SceneObject, hanging_frame, stand, wrench
 from wbc_suite.scene.placement import Region, SequentialSampler, UniformSampler
 from wbc_suite.sensing.reading import Reading, computed
-from wbc_suite.tomlfile import FrozenModel
 
 STAND, FRAME, TOOL = "base", "frame", "tool"
 FLAT = (0.5, 0.5, 0.5, 0.5)

@@ -10,6 +10,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control import RobotState
 from wbc_suite.robot.shapes import Size, SizeInterval
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras, placement
@@ -17,7 +18,6 @@ from wbc_suite.scene.objects import SceneObject, hammer
 from wbc_suite.scene.objects.tools import HAMMER_LYING
 from wbc_suite.scene.placement import Placements, Region
 from wbc_suite.sensing.reading import Reading, site_position
-from wbc_suite.tomlfile import FrozenModel
 
 HAMMER, HANDLE = "hammer", "hammer_handle"
 

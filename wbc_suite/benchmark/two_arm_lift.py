@@ -9,13 +9,13 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control import RobotState
 from wbc_suite.robot.shapes import Size
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras
 from wbc_suite.scene.objects import SceneObject, pot
 from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.sensing.reading import Reading, site_position
-from wbc_suite.tomlfile import FrozenModel
 
 POT, HANDLES = "pot", ("pot_handle0", "pot_handle1")
 WALL = 0.006

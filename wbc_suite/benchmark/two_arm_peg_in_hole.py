@@ -12,6 +12,7 @@ from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.predicates import crossing
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Rgba
@@ -25,7 +26,6 @@ from wbc_suite.sensing.reading import (
     computed,
     offset,
 )
-from wbc_suite.tomlfile import FrozenModel
 
 PEG, PLATE = "peg", "plate"
 ACROSS = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)

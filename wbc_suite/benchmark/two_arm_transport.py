@@ -11,6 +11,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.robot.elements import Rgba
 from wbc_suite.robot.shapes import Size, Vector3
 from wbc_suite.scene import TableConfig, add_table_cameras, add_tables
@@ -24,7 +25,6 @@ from wbc_suite.sensing.reading import (
     computed,
     site_position,
 )
-from wbc_suite.tomlfile import FrozenModel
 
 LID, PAYLOAD, TRASH = "lid", "payload", "trash"
 START_BIN, TARGET_BIN, TRASH_BIN = "start_bin", "target_bin", "trash_bin"

@@ -17,13 +17,13 @@ from wbc_suite.benchmark.standing import (
     arrange_on_feet,
     wrapped,
 )
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Channel
 from wbc_suite.robot.shapes import Interval, Size, SizeInterval
 from wbc_suite.scene.objects import Part, SceneObject
 from wbc_suite.sensing.reading import Reading, body_position, body_quat, computed
-from wbc_suite.tomlfile import FrozenModel
 
 GOAL = "goal"
 THICK = 0.002

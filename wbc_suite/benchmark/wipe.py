@@ -11,6 +11,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.predicates import hull_distances
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot.elements import Channel
@@ -18,7 +19,6 @@ from wbc_suite.scene import TableConfig, add_table, add_table_cameras
 from wbc_suite.scene.objects import SceneObject
 from wbc_suite.sensing.hands import pairs_in_contact
 from wbc_suite.sensing.reading import Reading, offset, site_position, user_values
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 
 MARK = "mark"

@@ -95,8 +95,8 @@ def _benchmarks(files: Sequence[Path]) -> Iterator[Row]:
 
 
 def _controllers(files: Sequence[Path]) -> Iterator[Row]:
+    from wbc_suite.config_files import read_toml
     from wbc_suite.control import COMPOSITES, PART_CONTROLLERS
-    from wbc_suite.tomlfile import read_toml
 
     for name in COMPOSITES:
         yield name, "for any robot; its file, if it has one, is listed below"
@@ -149,7 +149,7 @@ def check_file(
     warnings for what falls or moves. The first error names the file, the key, the value
     and the rule. A JSON file is a controller config of robosuite; it needs --robot.
     """
-    from wbc_suite.tomlfile import read_toml
+    from wbc_suite.config_files import read_toml
 
     content = read_toml(file) if file.suffix == ".toml" else {"component": None}
     inferred: dict[str, list[str]] = {}

@@ -9,11 +9,6 @@ from wbc_suite.control.action import (
     Unit,
 )
 from wbc_suite.control.composite.basic import BasicController, default_basic_config
-from wbc_suite.control.composite.frame_kinds import (
-    FRAME_KINDS,
-    FrameKind,
-    register_frame_kind,
-)
 from wbc_suite.control.composite.protocols import (
     CompositeController,
     SteppedController,
@@ -26,6 +21,11 @@ from wbc_suite.control.composite.registry import (
     load_composite_controller_config,
     register_composite,
     register_config_converter,
+)
+from wbc_suite.control.ik.frame_kinds import (
+    FRAME_KINDS,
+    FrameKind,
+    register_frame_kind,
 )
 from wbc_suite.control.law.joint_laws import JointLaw, VelocityLaw
 from wbc_suite.control.law.law import LAWS, Law, ServoLaw, TorqueLaw, register_law

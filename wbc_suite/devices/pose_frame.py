@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 from pydantic import Field, ValidationError, field_validator
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
-from wbc_suite.tomlfile import FrozenModel
 
 MAX_BYTES = 32_768
 """Maximum size of a frame; two hands with all their joints take 4 kB."""

@@ -16,6 +16,7 @@ from pydantic import (
     model_validator,
 )
 
+from wbc_suite.config_files import FrozenModel, parse_model
 from wbc_suite.control import CompositeControllerName, PartControllerName
 from wbc_suite.envs.states import Randomiser
 from wbc_suite.errors import ConfigError, UnknownArgumentError, did_you_mean
@@ -24,7 +25,6 @@ from wbc_suite.scene.placement import Sampler
 from wbc_suite.sensing.cameras import CameraRequest
 from wbc_suite.sensing.renderer import RenderPreset
 from wbc_suite.sensing.segmentation import SegmentationLevel
-from wbc_suite.tomlfile import FrozenModel, parse_model
 from wbc_suite.typing import RobotName
 
 RATE = 20.0

@@ -13,19 +13,19 @@ from wbc_suite.control.composite.protocols import (
     TickedController,
     solver_of_body,
 )
-from wbc_suite.control.composite.tick import WholeBodyArrays
-from wbc_suite.control.dynamics.state_source import (
+from wbc_suite.control.contact.state_source import (
     begin_source,
     make_state_source,
     source_memory,
 )
-from wbc_suite.control.loop.advance import advance
-from wbc_suite.control.loop.data import LoopData, loop_data
-from wbc_suite.control.loop.kernels import DECIDING, bind_kernels
-from wbc_suite.control.loop.records import gather
+from wbc_suite.control.ground.records import gather
+from wbc_suite.control.ik.compiled_tick import WholeBodyArrays
 from wbc_suite.control.memory import Memory
 from wbc_suite.control.part.ik_tick import HandIk
-from wbc_suite.envs.watch import PhysicsWatch, check_laws, check_model
+from wbc_suite.control.run.advance import advance
+from wbc_suite.control.run.data import LoopData, loop_data
+from wbc_suite.control.run.kernel_table import DECIDING, bind_kernels
+from wbc_suite.envs.physics_watch import PhysicsWatch, check_laws, check_model
 from wbc_suite.typing import Vector
 
 

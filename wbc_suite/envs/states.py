@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wbc_suite.arguments import check_array
-from wbc_suite.control.loop.state_checks import FASTEST
+from wbc_suite.control.run.state_checks import FASTEST
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Vector
 

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from wbc_suite.atomic_files import check_folder, write_bytes
+from wbc_suite.config_files import parse_json
 from wbc_suite.errors import ConfigError, DatasetError
 from wbc_suite.executors.executor import Executor, Outcome, Work, WorkItem
 from wbc_suite.files import read_text
-from wbc_suite.tomlfile import parse_json
 
 MAX_BYTES = 64 << 20  # larger result files are not read
 

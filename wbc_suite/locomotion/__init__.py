@@ -25,7 +25,7 @@ from wbc_suite.locomotion.gait import (
     make_measured,
     make_plan,
 )
-from wbc_suite.locomotion.gaits import GAITS, register_gait
+from wbc_suite.locomotion.gait_registry import GAITS, register_gait
 from wbc_suite.locomotion.trot import plan_trot
 from wbc_suite.locomotion.walk import plan_walk
 

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from wbc_suite.compiling import inner, readable, struct
-from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Records, Vector
 
 GRAVITY = 9.81
@@ -163,7 +163,7 @@ class Measured(NamedTuple):
     """Where the robot is; world axes.
 
     Attributes:
-        com: Centre of mass, m, shape (3,); on a slope see `control.dynamics.terms`.
+        com: Centre of mass, m, shape (3,); on a slope see `control.contact.terms`.
         com_velocity: Its velocity, m/s, shape (3,).
         foot: Middle of the contact of each foot, m, shape (n, 3).
         foot_yaw: Heading of each foot, rad, shape (n,).

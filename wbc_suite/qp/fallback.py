@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wbc_suite.qp.joint_window import merge_bounds
 from wbc_suite.qp.level import Level
-from wbc_suite.qp.limit import merge_bounds
 from wbc_suite.qp.problem import UNBOUNDED, Problem, clip_step
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.qp.solver import DaqpSolver, QpSolver

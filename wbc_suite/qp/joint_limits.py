@@ -16,7 +16,7 @@ _NO_LIMIT = 1e10
 class PositionLimit(BoxLimit):
     """Keep `q_lower <= q + dq <= q_upper` for every one-parameter joint.
 
-    A joint outside a limit returns at its greatest speed; see `limit.merge_bounds`.
+    A joint outside a limit returns at its greatest speed; see `joint_window.merge_bounds`.
 
     Args:
         gain: Fraction of the distance to a limit that one step may cover, (0, 1].
@@ -120,7 +120,7 @@ class AccelerationLimit(BoxLimit):
     """Keep `|v - v_previous| <= a_max dt`, and brake in time for position limits.
 
     With it a joint approaches its position limit no faster than it can brake:
-    `v dt + v^2 / (2 a) <= d`; see `limit.merge_bounds`.
+    `v dt + v^2 / (2 a) <= d`; see `joint_window.merge_bounds`.
 
     Args:
         default: Limit of every joint, rad/s^2 or m/s^2. 50 rad/s^2 bounds transients

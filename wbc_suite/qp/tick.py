@@ -16,7 +16,7 @@ from wbc_suite.compiling import by_address, compiled, inner, struct
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.qp.active_set import QpArrays, solve_warm
-from wbc_suite.qp.limit import merge_bounds
+from wbc_suite.qp.joint_window import merge_bounds
 from wbc_suite.qp.problem import UNBOUNDED, worst_violation
 from wbc_suite.qp.strict_level import restrict_level
 from wbc_suite.qp.task_rows import LevelArrays, PartArrays, write_tasks

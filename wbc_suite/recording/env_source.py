@@ -11,13 +11,13 @@ from typing import Any, NoReturn
 
 from wbc_suite import __version__
 from wbc_suite.benchmark import BENCHMARKS
+from wbc_suite.config_files import parse_json
 from wbc_suite.control import load_composite_controller_config
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.config import EnvConfig
 from wbc_suite.errors import DatasetError, WbcError, shortened
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Fact
-from wbc_suite.tomlfile import parse_json
 
 PACKAGE = "wbc_suite"
 GYM_TYPE = 2  # type of Gymnasium environments in robomimic's `env_args`

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.config_files import parse_model
 from wbc_suite.errors import DescriptionError, UnknownNameError
 from wbc_suite.robot.assembly_steps import (
     LISTS,
@@ -29,7 +30,6 @@ from wbc_suite.robot.robot_file import (
 )
 from wbc_suite.robot.shapes import SkinMesh
 from wbc_suite.robot.skins import SkinFinder
-from wbc_suite.tomlfile import parse_model
 
 TABLES = ("groups", "keyframes", "materials", "synergies", "skins")
 """Fields of a robot that are joined by name."""

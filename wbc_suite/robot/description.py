@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, model_validator
 
+from wbc_suite.config_files import parse_model
 from wbc_suite.errors import DescriptionError, look_up
 from wbc_suite.robot.elements import Elements, Frame, Joint, Link, Name, Synergy
 from wbc_suite.robot.shapes import Shape, SkinMesh
 from wbc_suite.robot.validation import check_description
-from wbc_suite.tomlfile import parse_model
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,8 +16,8 @@ from pydantic import (
     model_validator,
 )
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.robot.shapes import Axis, Posed, Quaternion, Real, Shape, Vector3
-from wbc_suite.tomlfile import FrozenModel
 
 Name: TypeAlias = Annotated[
     str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=80)

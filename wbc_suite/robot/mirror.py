@@ -14,12 +14,12 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.errors import DescriptionError
 from wbc_suite.robot.elements import Elements, Joint, Link, Name
 from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
 from wbc_suite.robot.poses import HasPose, pose_fields, rotation_matrix
 from wbc_suite.robot.shapes import Capsule, Cylinder, Hull, Loft, Shape
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 
 E = TypeVar("E", bound=Elements)

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from wbc_suite.catalogue import Catalogue, merge
+from wbc_suite.config_files import FrozenModel, parse_model, parse_toml
 from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.files import read_text
 from wbc_suite.robot.elements import (
@@ -26,7 +27,6 @@ from wbc_suite.robot.elements import (
 )
 from wbc_suite.robot.mirror import Mirror, reflect
 from wbc_suite.robot.shapes import Posed, as_table
-from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml
 
 
 class Header(FrozenModel):

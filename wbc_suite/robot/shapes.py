@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeAlias, TypeVar, cast
 
 from pydantic import AfterValidator, Field, model_validator
 
-from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.config_files import FrozenModel
 
 S = TypeVar("S")
 T = TypeVar("T")

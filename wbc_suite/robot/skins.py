@@ -16,11 +16,11 @@ from pydantic import Field
 
 from wbc_suite import logs
 from wbc_suite.catalogue import Catalogue, user_cache_root
+from wbc_suite.config_files import FrozenModel, load_model
 from wbc_suite.errors import ConfigError, UnknownNameError, look_up
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.mesh_files import MeshIndex
 from wbc_suite.robot.shapes import Color, Posed, SkinMesh, Vector3
-from wbc_suite.tomlfile import FrozenModel, load_model
 
 log = logs.logger(__name__)
 

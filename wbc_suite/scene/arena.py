@@ -7,10 +7,10 @@ from typing import Annotated, TypeAlias
 import mujoco
 from pydantic import Field, model_validator
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.robot.shapes import Size, Vector3
 from wbc_suite.scene.compose import add_camera
 from wbc_suite.scene.materials import FRICTION, add_texture, wood_pixels
-from wbc_suite.tomlfile import FrozenModel
 
 WOOD_SIZE = 512  # pixels along each side of the table's texture
 

@@ -5,11 +5,11 @@ from functools import partial
 
 from pydantic import model_validator
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.robot.elements import Channel
 from wbc_suite.robot.shapes import Size, Vector3
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 from wbc_suite.scene.objects.vessels import open_bin
-from wbc_suite.tomlfile import FrozenModel
 
 LEG: Color = (0.32, 0.33, 0.35, 1.0)
 LEG_RADIUS, INSET = 0.012, 0.03  # m, of legs, and from the edges of the bin

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite import logs
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.errors import ConfigError, UnknownNameError, join_first
 from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.poses import pose_at, pose_fields
@@ -35,7 +36,6 @@ from wbc_suite.scene.surfaces import (
     surface_at_site,
     surface_of_geom,
 )
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 log = logs.logger(__name__)

@@ -7,12 +7,12 @@ from typing import Any, Protocol, TypeAlias
 
 from numpy.random import Generator
 
+from wbc_suite.config_files import FrozenModel, parse_model
 from wbc_suite.errors import ConfigError, PlacementError
 from wbc_suite.registry import Registry
 from wbc_suite.robot.shapes import Interval, Real, Vector3
 from wbc_suite.scene.objects.object_state import Extent, ObjectState
 from wbc_suite.scene.objects.scene_object import STANDING, Quat
-from wbc_suite.tomlfile import FrozenModel, parse_model
 
 TRIES = 300  # poses drawn for one object before all objects are placed again
 LAYOUTS = 20  # how often all objects of a sampler are placed before an error

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat, field_validator
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.robot.shapes import Vector3
-from wbc_suite.tomlfile import FrozenModel
 
 Newtons = Annotated[float, Field(ge=0.0, le=1e5)]
 

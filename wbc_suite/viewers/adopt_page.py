@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 import numpy as np
 
 from wbc_suite.atomic_files import check_folder, write_bytes
-from wbc_suite.control.composite.whole_body_config import default_whole_body_config
-from wbc_suite.control.composite.whole_body_dynamics_config import (
+from wbc_suite.config_files import parse_model
+from wbc_suite.control.ik.config import default_whole_body_config
+from wbc_suite.control.walking.config import (
     default_dynamics_config,
 )
 from wbc_suite.envs.hold_check import hold_faults
@@ -20,7 +21,6 @@ from wbc_suite.robot.adopt.missing_data import with_rotor
 from wbc_suite.robot.adopt.soles import guess_sole
 from wbc_suite.robot.elements import Frame, Root
 from wbc_suite.robot.toml_export import toml_text
-from wbc_suite.tomlfile import parse_model
 from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.robot_page import RobotPage
 from wbc_suite.viewers.session_state import plain

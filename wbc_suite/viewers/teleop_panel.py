@@ -61,12 +61,16 @@ class Page(Protocol):
     """What the panel is given of its page; see `TeleopPage`."""
 
     session: "Session"
-    server: "viser.ViserServer"
     colours: "MappingProxyType[str, Colour]"
     handles: "DragHandles"
     overlays: "BalanceOverlays"
     pictures: "CameraPictures"
     cameras: "CameraFollower"
+
+    @property
+    def server(self) -> "viser.ViserServer":
+        """The server of the page."""
+        ...
 
     @property
     def box(self) -> "Box":

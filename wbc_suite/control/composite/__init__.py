@@ -10,21 +10,21 @@ from wbc_suite.control.composite.basic import (
 )
 from wbc_suite.control.composite.hybrid import HybridMobileBase, check_hybrid
 from wbc_suite.control.composite.registry import register_composite
-from wbc_suite.control.composite.whole_body import WholeBodyIK
-from wbc_suite.control.composite.whole_body_config import (
+from wbc_suite.control.ik.config import (
     default_whole_body_config,
     read_whole_body,
 )
-from wbc_suite.control.composite.whole_body_dynamics import WholeBodyID
-from wbc_suite.control.composite.whole_body_dynamics_config import (
+from wbc_suite.control.ik.whole_body_ik import WholeBodyIK
+from wbc_suite.control.state import RobotState
+from wbc_suite.control.walking.config import (
     check_dynamics,
     default_dynamics_config,
 )
-from wbc_suite.control.state import RobotState
+from wbc_suite.control.walking.whole_body_id import WholeBodyID
 
 
 def _whole_body_mink_ik(config: Mapping[str, Any], state: RobotState) -> WholeBodyIK:
-    from wbc_suite.control.composite.mink_backend import MinkBackend
+    from wbc_suite.control.ik.mink_solver import MinkBackend
 
     return WholeBodyIK(config, state, MinkBackend)
 

@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, InstanceOf
 
+from wbc_suite.config_files import FrozenModel, located, parse_model
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.law.joint_laws import JointLaw, JointLawConfig
 from wbc_suite.control.law.law import Law, ServoLaw
@@ -29,7 +30,6 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
-from wbc_suite.tomlfile import FrozenModel, located, parse_model
 from wbc_suite.typing import Vector
 
 

@@ -3,9 +3,9 @@
 from typing import Any, Protocol, runtime_checkable
 
 from wbc_suite.control.action import ActionLayout
-from wbc_suite.control.composite.tick import WholeBodyArrays
-from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
-from wbc_suite.control.dynamics.state_source import StateSourceConfig
+from wbc_suite.control.contact.arrays import WholeBodyDynamics
+from wbc_suite.control.contact.state_source import StateSourceConfig
+from wbc_suite.control.ik.compiled_tick import WholeBodyArrays
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.ik_tick import HandIk

@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 from wbc_suite import logs
 from wbc_suite.catalogue import Catalogue, merge
+from wbc_suite.config_files import located, read_json, read_toml
 from wbc_suite.control.composite.protocols import CompositeController
 from wbc_suite.control.part.registry import (
     PART_CONTROLLERS,
@@ -18,7 +19,6 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.registry import Registry
 from wbc_suite.robot import RobotDescription, load_robot
-from wbc_suite.tomlfile import located, read_json, read_toml
 from wbc_suite.typing import RobotName
 
 log = logs.logger(__name__)

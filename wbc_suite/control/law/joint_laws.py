@@ -6,11 +6,11 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 
 from wbc_suite.compiling import compiled, inner
+from wbc_suite.config_files import FrozenModel
+from wbc_suite.control.ground.physics import Physics
+from wbc_suite.control.ground.records import Drive, Drives, LawKind, LawRecord
 from wbc_suite.control.law.law import Law, reference_at
-from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import Drive, Drives, LawKind, LawRecord
 from wbc_suite.control.state import RobotState
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 

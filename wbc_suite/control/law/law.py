@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.compiling import inner
-from wbc_suite.control.loop.records import Drive, Drives, LawKind, LawRecord, Laws
+from wbc_suite.control.ground.records import Drive, Drives, LawKind, LawRecord, Laws
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
@@ -79,7 +79,7 @@ _OBSERVER = ("desired", "last_velocity", "saturation", "disturbance")
 class Law:
     """A law for some driven joints; its numbers are in records that the loop reads.
 
-    The kernel of each kind stands beside its class; `loop.inverse_dynamics` computes
+    The kernel of each kind stands beside its class; `run.commands` computes
     torques from the accelerations that all laws ask for.
 
     The kind selects the kernel: a `LawKind`, or the name of a registered law.

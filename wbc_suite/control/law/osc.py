@@ -6,10 +6,9 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.compiling import compiled, inner
-from wbc_suite.control.law.law import Law
-from wbc_suite.control.loop.physics import OscWork, Physics
-from wbc_suite.control.loop.records import Drives, LawKind, LawRecord
-from wbc_suite.control.loop.rigid_body import (
+from wbc_suite.control.ground.physics import OscWork, Physics
+from wbc_suite.control.ground.records import Drives, LawKind, LawRecord
+from wbc_suite.control.ground.rigid_body import (
     matrix_product,
     moves_body,
     point_jacobian_column,
@@ -17,6 +16,7 @@ from wbc_suite.control.loop.rigid_body import (
     rotation,
     write_inertia,
 )
+from wbc_suite.control.law.law import Law
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.poses import pose_vector
 from wbc_suite.control.state import RobotState

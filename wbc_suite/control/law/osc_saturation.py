@@ -3,10 +3,10 @@
 import numpy as np
 
 from wbc_suite.compiling import inner
-from wbc_suite.control.loop.acceleration_limits import acceleration_limits
-from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import Drives, LawRecord
-from wbc_suite.control.loop.rigid_body import multiply_inertia
+from wbc_suite.control.ground.acceleration_limits import acceleration_limits
+from wbc_suite.control.ground.physics import Physics
+from wbc_suite.control.ground.records import Drives, LawRecord
+from wbc_suite.control.ground.rigid_body import multiply_inertia
 from wbc_suite.linear_algebra import cholesky, dot, lq_factor, solve_lower, solve_upper
 from wbc_suite.qp.least_change import least_change
 from wbc_suite.typing import Matrix, Vector

@@ -6,8 +6,8 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 
 from wbc_suite.control.action import Axis, SliceKind, Unit
+from wbc_suite.control.ground.records import LawKind
 from wbc_suite.control.law.joint_laws import VelocityLaw
-from wbc_suite.control.loop.records import LawKind
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.part.part_settings import (

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import pinocchio as pin
 
 from wbc_suite.control.action import ActionPart
-from wbc_suite.control.dynamics.standing import Standing
+from wbc_suite.control.contact.standing import Standing
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.ik_tick import HandIk

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 from pydantic import model_validator
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.part_settings import (
     ROUNDING,
@@ -17,7 +18,6 @@ from wbc_suite.control.part.part_settings import (
     limits_of,
 )
 from wbc_suite.control.poses import pose_vector, vector_pose
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 
 

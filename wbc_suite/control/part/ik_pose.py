@@ -8,11 +8,13 @@ import numpy as np
 import pinocchio as pin
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
+from wbc_suite.control.ground.feasible_acceleration import feasible_accelerations
 from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.law.spline_reference import SplineReference, window_length
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.controller import PartController
-from wbc_suite.control.part.feasible_acceleration import feasible_accelerations
 from wbc_suite.control.part.hand_goal import HandGoal, HandSettings, relative_pose
 from wbc_suite.control.part.ik_tick import HandIk, HandState
 from wbc_suite.control.part.part_settings import (
@@ -24,7 +26,6 @@ from wbc_suite.control.part.part_settings import (
     apply_torque_settings,
     damping_of,
 )
-from wbc_suite.control.part.spline_reference import SplineReference, window_length
 from wbc_suite.control.poses import row_of, vector_pose
 from wbc_suite.control.reasons import LazyReasons, Reason
 from wbc_suite.control.robot_parts import RobotPart
@@ -40,7 +41,6 @@ from wbc_suite.qp import (
     VelocityLimit,
 )
 from wbc_suite.qp.tick import TickStatus
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 AXES = (Axis.X, Axis.Y, Axis.Z, Axis.QX, Axis.QY, Axis.QZ, Axis.QW)

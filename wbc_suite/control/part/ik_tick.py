@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from wbc_suite.compiling import Record, inner, struct
+from wbc_suite.control.ground.physics import Physics
+from wbc_suite.control.ground.records import Drives, Laws
+from wbc_suite.control.law.approach import approach_pose
 from wbc_suite.control.law.law import set_reference
-from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import Drives, Laws
-from wbc_suite.control.part.approach import approach_pose
-from wbc_suite.control.part.spline_reference import SplineArrays, extend_spline
+from wbc_suite.control.law.spline_reference import SplineArrays, extend_spline
 from wbc_suite.control.poses import (
     multiply,
     write_frame_pose,

@@ -5,10 +5,10 @@ from typing import Literal, TypeAlias
 import numpy as np
 from pydantic import NonNegativeFloat
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control.action import ActionPart, SliceKind, Unit
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.part_settings import damping_of, limits_of, spread
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 Gains: TypeAlias = NonNegativeFloat | tuple[NonNegativeFloat, ...]

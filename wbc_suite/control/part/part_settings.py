@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal, TypeAlias
 import numpy as np
 from pydantic import Field, NonNegativeFloat
 
+from wbc_suite.config_files import FrozenModel
 from wbc_suite.control.action import ActionPart, SliceKind, Unit
 from wbc_suite.control.law.law import Law
 from wbc_suite.errors import ConfigError
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 InputType = Literal["delta", "absolute"]

@@ -5,13 +5,13 @@ from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 from pydantic import BaseModel
 
+from wbc_suite.config_files import located, parse_model
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.robot_parts import hands_of, robot_part
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.registry import Registry
 from wbc_suite.robot import RobotDescription
-from wbc_suite.tomlfile import located, parse_model
 
 PartControllerName: TypeAlias = Literal[
     "OSC_POSE",

@@ -6,8 +6,9 @@ from typing import Literal
 import numpy as np
 from pydantic import model_validator
 
-from wbc_suite.control.dynamics.arrays import Foot
-from wbc_suite.control.dynamics.standing import Standing, make_foot
+from wbc_suite.config_files import FrozenModel
+from wbc_suite.control.contact.arrays import Foot
+from wbc_suite.control.contact.standing import Standing, make_foot
 from wbc_suite.control.law.joint_laws import JointLaw, JointLawConfig
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.robot_parts import RobotPart, motors
@@ -17,7 +18,6 @@ from wbc_suite.qp import Sole
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.adopt.soles import ball_radius, guess_sole
 from wbc_suite.robot.elements import Name
-from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 INSET = 0.005

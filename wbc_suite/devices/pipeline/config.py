@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.config_files import FrozenModel
 
 Point = tuple[float, float, float]
 

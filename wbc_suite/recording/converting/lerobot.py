@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.atomic_files import new_folder, replace_file, write_bytes
+from wbc_suite.config_files import parse_json
 from wbc_suite.errors import DatasetError
 from wbc_suite.extras import import_extra
 from wbc_suite.recording.converting.layout import (
@@ -35,7 +36,6 @@ from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
 from wbc_suite.recording.video import Mp4Writer
 from wbc_suite.robot.shapes import as_table
-from wbc_suite.tomlfile import parse_json
 
 CHUNK = 1000  # files in a folder
 MOMENTS = ("min", "max", "mean", "std")

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from wbc_suite import logs
+from wbc_suite.config_files import parse_model
 from wbc_suite.errors import DescriptionError, join_first, shortened
 from wbc_suite.robot.adopt.limbs import (
     Limb,
@@ -29,7 +30,6 @@ from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
 from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
 from wbc_suite.robot.validation import RESERVED
-from wbc_suite.tomlfile import parse_model
 
 LOG = logs.logger(__name__)
 

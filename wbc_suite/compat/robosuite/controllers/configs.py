@@ -9,13 +9,13 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
+from wbc_suite.config_files import read_json
 from wbc_suite.control import COMPOSITES
 from wbc_suite.control import load_composite_controller_config as load_ours
 from wbc_suite.control.composite.registry import default_composite
 from wbc_suite.control.robot_parts import hands_of, parts_of
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription, load_robot
-from wbc_suite.tomlfile import read_json
 
 PART_CONTROLLER_INFO = {
     "JOINT_VELOCITY": "Joint Velocity",

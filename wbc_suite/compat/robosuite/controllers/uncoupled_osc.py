@@ -19,11 +19,11 @@ from wbc_suite.compat.robosuite.controllers.variable_impedance import (
     GainsFirstController,
 )
 from wbc_suite.compiling import compiled, inner
+from wbc_suite.control.ground.physics import Physics
+from wbc_suite.control.ground.records import Drives, LawRecord
+from wbc_suite.control.ground.rigid_body import point_velocity_and_drift
 from wbc_suite.control.law.law import law_kind, register_law
 from wbc_suite.control.law.osc import OscLaw, write_hand_task
-from wbc_suite.control.loop.physics import Physics
-from wbc_suite.control.loop.records import Drives, LawRecord
-from wbc_suite.control.loop.rigid_body import point_velocity_and_drift
 from wbc_suite.control.part.impedance import Gains
 from wbc_suite.control.part.osc_controller import OscConfig, OscController
 from wbc_suite.control.part.registry import register_part_controller

@@ -16,9 +16,9 @@ from wbc_suite.compat.robosuite.utils.mjcf_utils import (
     add_prefix,
     parse_file,
 )
+from wbc_suite.config_files import read_toml
 from wbc_suite.robot import RobotDescription
 from wbc_suite.scene.objects import Extent
-from wbc_suite.tomlfile import read_toml
 
 SECTIONS = (
     *("worldbody", "asset", "actuator", "sensor", "tendon", "equality", "contact"),

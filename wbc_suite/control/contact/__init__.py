@@ -1,0 +1,1 @@
+"""One QP for the contact forces and accelerations of a robot on its feet."""

@@ -1,1 +1,0 @@
-"""Whole-body inverse dynamics: contact forces and joint accelerations by one QP."""

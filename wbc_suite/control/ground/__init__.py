@@ -1,0 +1,1 @@
+"""MuJoCo's arrays, and the numbers of laws as kernels read them."""

@@ -1,0 +1,1 @@
+"""From goals of frames to joint commands: whole-body inverse kinematics."""

@@ -1,1 +1,0 @@
-"""The compiled control loop: MuJoCo's arrays, records of laws, and the physics step."""

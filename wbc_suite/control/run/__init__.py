@@ -1,0 +1,1 @@
+"""All laws of a simulation in one compiled call."""
