@@ -16,7 +16,7 @@ _NO_LIMIT = 1e10
 class PositionLimit(BoxLimit):
     """Keep `q_lower <= q + dq <= q_upper` for every one-parameter joint.
 
-    A joint outside a limit returns at its greatest speed; see `joint_window.merge_bounds`.
+    A joint outside a limit returns at its greatest speed; see `joint_window`.
 
     Args:
         gain: Fraction of the distance to a limit that one step may cover, (0, 1].
