@@ -63,6 +63,9 @@ TOP = (
 
 PACKAGES = BASE + ORDER + TOP
 
+CONTROL = ("ground", "law", "contact", "part", "ik", "walking", "composite", "run")
+"""Packages of `control`; the modules beside them come first."""
+
 OPENED_BY_NAME = {
     "registration": {"envs", "wrappers"},  # Gymnasium's entry points are strings
     "envs": {"viewers"},  # the page of `render_mode="human"` is made when it is shown
@@ -160,6 +163,21 @@ def circles(sources: Mapping[str, str]) -> list[list[str]]:
 
 def _dotted(path: Path) -> str:
     return ".".join(("wbc_suite", *_parts(path))).removesuffix(".__init__")
+
+
+@pytest.mark.parametrize("room", CONTROL)
+def test_packages_of_control_import_only_those_before_them(room):
+    allowed = CONTROL[: CONTROL.index(room) + 1]
+    for path in (PACKAGE / "control" / room).glob("*.py"):
+        for name in _imported(ast.parse(path.read_text(encoding="utf-8"))):
+            match = re.match(r"wbc_suite\.control\.(\w+)", name)
+            above = match is not None and match[1] in CONTROL
+            assert not above or match[1] in allowed, (path, name)
+
+
+def test_every_package_of_control_has_a_place():
+    found = {path.parent.name for path in (PACKAGE / "control").glob("*/__init__.py")}
+    assert found == {*CONTROL}
 
 
 def test_no_modules_import_each_other_in_a_circle():
