@@ -21,9 +21,9 @@ import numba
 
 from wbc_suite.compiling import plain
 from wbc_suite.control.ground.records import gather
-from wbc_suite.control.run.commands import write_commands
 from wbc_suite.control.run.data import LoopData, loop_data
 from wbc_suite.control.run.kernel_table import LoopKernels, bind_kernels
+from wbc_suite.control.run.motor_commands import write_commands
 
 ROBOTS = ("Panda", "Sawyer", "UR5e", "Baxter", "Tiago", "GR1")
 KINDS = ("OSC_POSE", "OSC_POSITION")

@@ -30,7 +30,7 @@ import pinocchio as pin
 from harness.report import Report, options
 from harness.stand import Stand
 
-from wbc_suite.control.ik.limits_of_config import distance_limits, joint_accelerations
+from wbc_suite.control.ik.qp_of_config import distance_limits, joint_accelerations
 from wbc_suite.control.ik.whole_body_ik import WholeBodyIK
 from wbc_suite.kinematics import Configuration
 from wbc_suite.planning import LimitChecker

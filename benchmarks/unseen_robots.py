@@ -34,7 +34,7 @@ from import_corpus import UNSEEN_SECTION, progress, unpack
 
 from wbc_suite.control import load_composite_controller_config
 from wbc_suite.control.ik.config import read_whole_body
-from wbc_suite.control.ik.limits_of_config import distance_limits
+from wbc_suite.control.ik.qp_of_config import distance_limits
 from wbc_suite.control.ik.reduced_robot import lock_groups
 from wbc_suite.envs.env import RobotEnv
 from wbc_suite.envs.hold_check import alone, hold_faults

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from wbc_suite.compiling import plain
-from wbc_suite.control.contact import compiled_tick as solve_tick
+from wbc_suite.control.contact import feet_tick as solve_tick
 from wbc_suite.control.contact import terms
 from wbc_suite.control.ground import acceleration_limits as limits
 from wbc_suite.control.ground.records import LawKind, LawRecord
@@ -32,7 +32,7 @@ from wbc_suite.control.law import osc
 from wbc_suite.control.part.joint_controllers import JointPositionController
 from wbc_suite.control.part.osc_controller import OscConfig
 from wbc_suite.control.poses import pose_vector
-from wbc_suite.control.run import commands as inverse_dynamics
+from wbc_suite.control.run import motor_commands as inverse_dynamics
 from wbc_suite.control.walking.whole_body_id import WholeBodyID
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from wbc_suite.control import load_composite_controller_config
 from wbc_suite.control.ik.config import read_whole_body
-from wbc_suite.control.ik.limits_of_config import distance_limits
+from wbc_suite.control.ik.qp_of_config import distance_limits
 from wbc_suite.envs.hold_check import alone
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import load_robot

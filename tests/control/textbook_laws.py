@@ -14,7 +14,7 @@ from wbc_suite.control.ground.acceleration_limits import RATE
 from wbc_suite.control.ground.records import LawKind
 from wbc_suite.control.law.osc import LEAST_DAMPING, SINGULAR
 from wbc_suite.control.law.osc_saturation import POSTURE_COST, SHORTENING_COST
-from wbc_suite.control.run.commands import write_commands
+from wbc_suite.control.run.motor_commands import write_commands
 
 UNBOUNDED = 1e30
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wbc_suite
-from wbc_suite.control.ik.limits_of_config import accelerations
+from wbc_suite.control.ik.qp_of_config import accelerations
 from wbc_suite.devices import DeviceState, LimbInput, Pipeline, PipelineConfig
 
 RATE = 100.0

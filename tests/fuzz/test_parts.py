@@ -21,9 +21,9 @@ from wbc_suite.control.composite.protocols import solver_of_body
 from wbc_suite.control.ground.records import gather
 from wbc_suite.control.part.registry import PART_CONTROLLERS
 from wbc_suite.control.robot_parts import hands_of, parts_of
-from wbc_suite.control.run.commands import write_commands
 from wbc_suite.control.run.data import loop_data
 from wbc_suite.control.run.kernel_table import bind_kernels
+from wbc_suite.control.run.motor_commands import write_commands
 from wbc_suite.errors import ActionError, WbcError
 from wbc_suite.scene import attach_robot, empty_arena
 

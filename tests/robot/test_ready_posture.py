@@ -9,9 +9,9 @@ from wbc_suite.compiling import compiled
 from wbc_suite.control import RobotState
 from wbc_suite.control.ground.records import gather
 from wbc_suite.control.law.joint_laws import JointLaw
-from wbc_suite.control.run.commands import write_commands
 from wbc_suite.control.run.data import loop_data
 from wbc_suite.control.run.kernel_table import bind_kernels
+from wbc_suite.control.run.motor_commands import write_commands
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import SelfCollisionLimit
 from wbc_suite.robot import load_robot

@@ -15,7 +15,7 @@ from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, Velocity
 from wbc_suite.qp.joint_tasks import DampingTask, JointCouplingTask, PostureTask
 from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, LimitKind, RowLimit
 from wbc_suite.qp.look_at_task import LookAtTask
-from wbc_suite.qp.motion import Approach, Escaping, Motion, Overshoot, Relaxed
+from wbc_suite.qp.motion_reasons import Approach, Escaping, Motion, Overshoot, Relaxed
 from wbc_suite.qp.part import SharedRow
 from wbc_suite.qp.plane_limits import FloorLimit, ObstacleLimit
 from wbc_suite.qp.problem import Problem

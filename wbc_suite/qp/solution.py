@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.qp.motion import Motion, reasons_to_move
+from wbc_suite.qp.motion_reasons import Motion, reasons_to_move
 from wbc_suite.qp.report import ActiveLimit, TaskReport, TickRecord
 from wbc_suite.typing import Vector
 

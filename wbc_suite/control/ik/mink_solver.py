@@ -10,7 +10,7 @@ from wbc_suite.control.ik.config import (
     ControlledFrame,
     WholeBodyIKConfig,
 )
-from wbc_suite.control.ik.limits_of_config import TRACKING_COST, travel_costs
+from wbc_suite.control.ik.qp_of_config import TRACKING_COST, travel_costs
 from wbc_suite.control.ik.solver import IkBackend, IkStep
 from wbc_suite.control.poses import pose_of
 from wbc_suite.control.reasons import NoSolution, Reason

@@ -9,7 +9,7 @@ import numpy as np
 from wbc_suite.control.ik.command_lead import limit_steps
 from wbc_suite.control.ik.config import WholeBodyIKConfig
 from wbc_suite.control.ik.frame_kinds import NO_SPEED_LIMIT, set_target
-from wbc_suite.control.ik.limits_of_config import (
+from wbc_suite.control.ik.qp_of_config import (
     TRACKING_COST,
     accelerations,
     held_equality,

@@ -13,13 +13,6 @@ from wbc_suite.control.ik.frame_kinds import (
     set_target,
 )
 from wbc_suite.control.ik.frame_targets import ControlledFrames
-from wbc_suite.control.ik.limits_of_config import (
-    accelerations,
-    held_equality,
-    joint_speeds,
-    travel_costs,
-    weight_limits,
-)
 from wbc_suite.control.ik.plan_triggers import (
     STUCK_AFTER,
     Event,
@@ -28,6 +21,13 @@ from wbc_suite.control.ik.plan_triggers import (
     progress_arrays,
     record_state,
     watch_progress,
+)
+from wbc_suite.control.ik.qp_of_config import (
+    accelerations,
+    held_equality,
+    joint_speeds,
+    travel_costs,
+    weight_limits,
 )
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.stance_controller import soles_of

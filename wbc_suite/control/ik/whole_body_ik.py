@@ -20,7 +20,7 @@ from wbc_suite.control.ik.config import (
 from wbc_suite.control.ik.finger_capsules import FingerCapsules
 from wbc_suite.control.ik.frame_goals import FrameGoals, place_goals
 from wbc_suite.control.ik.frame_targets import ControlledFrames
-from wbc_suite.control.ik.limits_of_config import accelerations, limit_checker
+from wbc_suite.control.ik.qp_of_config import accelerations, limit_checker
 from wbc_suite.control.ik.reduced_robot import (
     joint_indices,
     keyframe_posture,

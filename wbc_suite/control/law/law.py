@@ -79,7 +79,7 @@ _OBSERVER = ("desired", "last_velocity", "saturation", "disturbance")
 class Law:
     """A law for some driven joints; its numbers are in records that the loop reads.
 
-    The kernel of each kind stands beside its class; `run.commands` computes
+    The kernel of each kind stands beside its class; `run.motor_commands` computes
     torques from the accelerations that all laws ask for.
 
     The kind selects the kernel: a `LawKind`, or the name of a registered law.

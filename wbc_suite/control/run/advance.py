@@ -7,9 +7,9 @@ from wbc_suite.control.ground.mujoco_functions import (
     mj_step1,
     mj_step2,
 )
-from wbc_suite.control.run.commands import write_commands
 from wbc_suite.control.run.data import LoopData
 from wbc_suite.control.run.kernel_table import LoopKernels
+from wbc_suite.control.run.motor_commands import write_commands
 from wbc_suite.control.run.state_checks import check_after, check_before
 
 

@@ -14,7 +14,7 @@ from wbc_suite.compiling import (
     plain,
     struct,
 )
-from wbc_suite.control.contact.compiled_tick import solve_whole_body, write_whole_body
+from wbc_suite.control.contact.feet_tick import solve_whole_body, write_whole_body
 from wbc_suite.control.contact.state_source import read_all_sensors, use_all_feet
 from wbc_suite.control.ground.mujoco_functions import mj_kinematics, mj_step1
 from wbc_suite.control.ground.physics import Physics
@@ -52,7 +52,7 @@ class LoopKernels(NamedTuple):
         read_sensors: Writes the state that laws read.
         run_ticks: See `ik.compiled_tick`.
         run_hands: See `part.ik_tick`.
-        solve_bodies: See `contact.compiled_tick`.
+        solve_bodies: See `contact.feet_tick`.
         add_contacts: Subtracts the torques of contact forces from `physics.force`.
         pass_commands: Gives the commands of laws that read sensors to the actuators.
         override: Writes the commands of controllers in Python; see `SteppedController`.
