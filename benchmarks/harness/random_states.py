@@ -112,7 +112,7 @@ class Pegs(States):
         P = parent.xmat.reshape(3, 3)
         self.task.states["peg"].move(P.T @ (at - parent.xpos), quat_of(P.T @ R))
         mujoco.mj_forward(self.model, data)
-        return True
+        return self.world.gap("peg", self.world.geoms("plate")) > -DEEP
 
 
 class Things(States):
