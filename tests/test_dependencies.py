@@ -17,6 +17,7 @@ DISTRIBUTIONS = {
     "PIL": "pillow",
     "hid": "hidapi",
     "pinocchio": "pin",
+    "collada": "pycollada",
     "pink": "pin-pink",
     "sbx": "sbx-rl",
     "xdist": "pytest-xdist",

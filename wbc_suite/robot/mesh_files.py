@@ -96,6 +96,8 @@ def _trimesh() -> Any:
 
 def _loaded(path: Path, data: bytes) -> Any:
     """Return trimesh's mesh of a file, or its points if it has no faces."""
+    if path.suffix.lower() == COLLADA:
+        _import_extra("collada")
     # by its content, since trimesh would open the files that a path's file names
     kind = path.suffix[1:].lower()
     with np.errstate(invalid="ignore"):  # of NaN, which is refused
@@ -184,6 +186,6 @@ def _import_extra(name: str) -> Any:
         return importlib.import_module(name)
     except ImportError:
         raise ConfigError(
-            f"skin: meshes need {name.replace('_', '-')}, which is not installed. "
+            f"Meshes need the package of '{name}', which is not installed. "
             "Install it with: pip install 'wbc-suite[skins]'"
         ) from None
