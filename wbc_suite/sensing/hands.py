@@ -85,6 +85,13 @@ class Hand:
         """Whether its grip of an object can bear a load, N, in any direction."""
         return bear([self], geoms, load)
 
+    def friction(self, geoms: Collection[int]) -> float:
+        """Return the friction that the hand can exert on an object, sum mu F_n, N."""
+        return sum(
+            force * float(np.linalg.norm(cone[0] - cone.mean(axis=0)))
+            for _, cone, force in self.contacts(geoms)
+        )
+
     def contacts(self, geoms: Collection[int]) -> list[tuple[Vector, Matrix, float]]:
         """Return contacts with an object: points, edges of friction cones, forces.
 
