@@ -4,6 +4,7 @@ The task has a kernel, so that it runs in the compiled control loop as ours do.
 """
 
 import tomllib
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,9 @@ LEVEL = record_type(("joint", "i8"), ("axis", "f8", (3,)))
 """Numbers of a task: the joint that carries the frame, and the axis in it."""
 
 
-def level_rows(robot, own, dt, rows, values) -> None:  # noqa: ANN001, compiled
+def level_rows(
+    robot: Any, own: np.ndarray, dt: float, rows: np.ndarray, values: np.ndarray
+) -> None:
     """Write `e = a x z` and J, with a in world axes: `d(e) = -J dq`."""
     level, a = own.view(LEVEL)[0], np.empty(3)
     T, axis, j = robot.pose[level.joint], level.axis, level.joint

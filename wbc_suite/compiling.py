@@ -196,11 +196,20 @@ def plain(kernel: Any) -> Any:
     return FunctionType(function.__code__, names, function.__name__)
 
 
-class Record:
-    """Numbers that kernels read and write by name, in rows of a structured array.
+def record_type(*fields: tuple[Any, ...]) -> np.dtype[Any]:
+    """Return a type of records, 8 bytes a number, that kernels and Python read alike.
 
-    A subclass declares them: fields of type int, float or `Annotated[Vector, size]`,
-    each with its unit in the line below. Its objects stand for one row.
+    Args:
+        fields: Name, "f8" or "i8", and a shape where it is an array.
+    """
+    return np.dtype((np.record, list(fields)))
+
+
+class Record:
+    """A `record_type` whose fields type checkers know: an object stands for one record.
+
+    A subclass declares them, of type int, float or `Annotated[Vector, size]`, each with
+    its unit in the line below.
 
     Attributes:
         dtype: The type of its arrays.
@@ -211,32 +220,18 @@ class Record:
     def __init_subclass__(cls) -> None:
         hints = get_type_hints(cls, include_extras=True)
         hints.pop("dtype")
-        cls.dtype = np.dtype(
-            [(name, *_field_type(hint)) for name, hint in hints.items()]
+        cls.dtype = record_type(
+            *((name, *_field_type(hint)) for name, hint in hints.items())
         )
 
     @classmethod
     def zeros(cls, count: int = 1) -> Records:
         """Return records that are all zero, shape (count,)."""
-        return readable(np.zeros(count, cls.dtype))
+        return np.zeros(count, cls.dtype)
 
 
 def _field_type(hint: Any) -> tuple[Any, ...]:
     return {int: ("i8",), float: ("f8",)}.get(hint) or ("f8", get_args(hint)[1:])
-
-
-def readable(records: Records) -> Records:
-    """Return records whose fields plain Python reads as kernels do; a view."""
-    return records.view(np.recarray)
-
-
-def record_type(*fields: tuple[Any, ...]) -> np.dtype[Any]:
-    """Return a type of records, 8 bytes a number, that kernels and Python read alike.
-
-    Args:
-        fields: Name, "f8" or "i8", and a shape where it is an array.
-    """
-    return np.dtype((np.record, list(fields)))
 
 
 def struct(fields: type[Fields]) -> type[Fields]:

@@ -1,6 +1,7 @@
 """Random states of benchmarks: things at goals, tipped, leaned, stacked, in hands."""
 
 import math
+from abc import ABC, abstractmethod
 from typing import Any
 
 import mujoco
@@ -22,7 +23,7 @@ DOWN = np.diag([1.0, -1.0, -1.0])
 """Axes of a hand that looks down."""
 
 
-class States:
+class States(ABC):
     """Draws states of one benchmark; one scene has several.
 
     Attributes:
@@ -76,9 +77,9 @@ class States:
             at = site.translation
         state.move(hand.position - R @ at + rng.normal(0.0, 0.004, 3), quat_of(R))
 
+    @abstractmethod
     def draw(self) -> bool:
         """Draw a state; return whether nothing overlaps in it."""
-        raise NotImplementedError
 
 
 class Doors(States):

@@ -6,6 +6,7 @@ measured from poses alone, see `Look`.
 """
 
 import math
+from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -160,12 +161,12 @@ class OnFeet(States):
         """Return names of the things whose motion matters."""
         return ()
 
+    @abstractmethod
     def margins(self, moves: list[Motion]) -> Iterable[float]:
         """Return margins of the condition that must hold for a while.
 
         `moves` are those of the trunk and of what is followed.
         """
-        raise NotImplementedError
 
     def _pose(self, body: int) -> tuple[Vector, Matrix]:
         R = self.data.xmat[body].reshape(3, 3).copy()

@@ -298,8 +298,8 @@ def test_hands_come_last_and_keep_their_direction_where_they_are_asked_to(
     monkeypatch.setattr(inverse_dynamics, "is_saturated", lambda *_: saturated)
     monkeypatch.setattr(inverse_dynamics, "limit_accelerations", note("limit"))
     laws = LawRecord.zeros(3)
-    laws.kind = LawKind.OSC, LawKind.JOINT, LawKind.TORQUE
-    laws.kernel, laws.keep_direction = (1, 2, 0), (asked, 0.0, 0.0)
+    laws["kind"] = LawKind.OSC, LawKind.JOINT, LawKind.TORQUE
+    laws["kernel"], laws["keep_direction"] = (1, 2, 0), (asked, 0.0, 0.0)
     kernels = record(
         observe_roots=note("roots"),
         observe=note("observe"),
@@ -312,7 +312,7 @@ def test_hands_come_last_and_keep_their_direction_where_they_are_asked_to(
     plain(inverse_dynamics.ask_accelerations)(loop, kernels)
     kept = ["prepare", "direction"] * (saturated and asked > 0.0)
     assert called == ["roots", "observe", "joints", "limit", "hand", *kept, "limit"]
-    np.testing.assert_array_equal(laws.since, 0.002)
+    np.testing.assert_array_equal(laws["since"], 0.002)
     assert not physics.acceleration.any()
 
 

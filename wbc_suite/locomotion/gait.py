@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from wbc_suite.compiling import inner, readable, struct
+from wbc_suite.compiling import inner, record_type, struct
 from wbc_suite.config_files import FrozenModel
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Records, Vector
 
@@ -131,30 +131,28 @@ def settings_of(config: GaitConfig) -> np.dtype[np.void]:
     """
     fields = {*TrotConfig.model_fields, *WalkConfig.model_fields}
     fields |= {*type(config).model_fields}
-    return np.dtype([(name, "f8") for name in sorted(fields - {"type"})])
+    return record_type(*((name, "f8") for name in sorted(fields - {"type"})))
 
 
-STATE = np.dtype(
-    [
-        ("mode", "i8"),  # `Mode`
-        ("time", "f8"),  # s since the reset
-        ("until", "f8"),  # time until which the robot steps without a command, s
-        ("yaw", "f8"),  # heading, rad
-        ("velocity", "f8", (3,)),  # forward, left (m/s), turn (rad/s)
-        ("height", "f8"),  # centre of mass over the ground as commanded, m
-        ("nominal_height", "f8"),  # the same at the reset, m
-        ("ground", "f8"),  # height of the ground, m
-        ("reference", "f8", (2,)),  # of the centre of mass, m
-        ("phase", "f8"),  # trot: part of the cycle
-        ("stance", "i8"),  # walk: the foot that stands, 0 left, 1 right
-        ("since", "f8"),  # walk: time since the step began; trot: when it last stood, s
-        ("duration", "f8"),  # walk: of this step, s
-        ("shift", "f8"),  # walk: part of the way from standing to the first step
-        ("waiting", "f8"),  # walk: time since then, s
-        ("width", "f8"),  # walk: distance of the feet at the reset, m
-        ("progress", "f8"),  # walk: part of the swing
-        ("steps", "i8"),  # steps since the reset
-    ]
+STATE = record_type(
+    ("mode", "i8"),  # `Mode`
+    ("time", "f8"),  # s since the reset
+    ("until", "f8"),  # time until which the robot steps without a command, s
+    ("yaw", "f8"),  # heading, rad
+    ("velocity", "f8", (3,)),  # forward, left (m/s), turn (rad/s)
+    ("height", "f8"),  # centre of mass over the ground as commanded, m
+    ("nominal_height", "f8"),  # the same at the reset, m
+    ("ground", "f8"),  # height of the ground, m
+    ("reference", "f8", (2,)),  # of the centre of mass, m
+    ("phase", "f8"),  # trot: part of the cycle
+    ("stance", "i8"),  # walk: the foot that stands, 0 left, 1 right
+    ("since", "f8"),  # walk: time since the step began; trot: when it last stood, s
+    ("duration", "f8"),  # walk: of this step, s
+    ("shift", "f8"),  # walk: part of the way from standing to the first step
+    ("waiting", "f8"),  # walk: time since then, s
+    ("width", "f8"),  # walk: distance of the feet at the reset, m
+    ("progress", "f8"),  # walk: part of the swing
+    ("steps", "i8"),  # steps since the reset
 )
 
 
@@ -249,8 +247,8 @@ def make_gait(config: GaitConfig, soles: Matrix) -> Gait:
         if name != "type":
             settings[name] = getattr(config, name)
     return Gait(
-        settings=readable(settings),
-        state=readable(np.zeros(1, STATE)),
+        settings=settings,
+        state=np.zeros(1, STATE),
         sole=np.array(soles, dtype=np.float64),
         nominal=np.zeros((n, 2)),
         offset=np.zeros(n),

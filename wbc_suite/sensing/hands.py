@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Collection, Iterable, Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -22,6 +23,22 @@ BALANCED = 1e-9
 def pairs_in_contact(data: mujoco.MjData) -> list[list[int]]:
     """Return the two geoms of each contact."""
     return data.contact.geom.tolist() if data.ncon else []
+
+
+class GripContact(NamedTuple):
+    """A contact of a hand with an object, world axes.
+
+    Attributes:
+        point: Where it is, m, shape (3,).
+        edges: Edges of a pyramid inside its friction cone; 1 along the normal, (8, 3).
+        force: Normal force, N.
+        mu: Coefficient of friction.
+    """
+
+    point: Vector
+    edges: Matrix
+    force: float
+    mu: float
 
 
 class Hand:
@@ -87,29 +104,22 @@ class Hand:
 
     def friction(self, geoms: Collection[int]) -> float:
         """Return the friction that the hand can exert on an object, sum mu F_n, N."""
-        return sum(
-            force * float(np.linalg.norm(cone[0] - cone.mean(axis=0)))
-            for _, cone, force in self.contacts(geoms)
-        )
+        return sum(contact.mu * contact.force for contact in self.contacts(geoms))
 
-    def contacts(self, geoms: Collection[int]) -> list[tuple[Vector, Matrix, float]]:
-        """Return contacts with an object: points, edges of friction cones, forces.
-
-        Points are in m, normal forces in N; edges have shape (8, 3).
-        """
-        data, found, force = (
-            self._data,
-            list[tuple[Vector, Matrix, float]](),
-            np.zeros(6),
-        )
+    def contacts(self, geoms: Collection[int]) -> list[GripContact]:
+        """Return contacts with an object."""
+        data, found, force = self._data, list[GripContact](), np.zeros(6)
         for k, (a, b) in enumerate(pairs_in_contact(data)):
             side = (b in geoms and self.owns(a)) - (a in geoms and self.owns(b))
             if not side:
                 continue
             mujoco.mj_contactForce(self._model, data, k, force)
             normal, *tangents = side * data.contact.frame[k].reshape(3, 3)
-            cone = normal + data.contact.friction[k, :2] * EDGES @ np.array(tangents)
-            found.append((data.contact.pos[k], cone, force.item(0)))
+            mu = data.contact.friction[k, :2]
+            edges = normal + mu * EDGES @ np.array(tangents)
+            found.append(
+                GripContact(data.contact.pos[k], edges, force.item(0), float(mu[0]))
+            )
         return found
 
     def slip(self, body: int) -> float:
@@ -153,12 +163,12 @@ def bear(hands: Iterable[Hand], geoms: Collection[int], load: float) -> bool:
     from scipy.optimize import nnls  # takes 0.1 s to import
 
     contacts = [contact for hand in hands for contact in hand.contacts(geoms)]
-    total = sum(force for *_, force in contacts)
+    total = sum(contact.force for contact in contacts)
     if total <= 0.0:
         return False
-    middle = sum(point * force for point, _, force in contacts) / total
-    edges = np.vstack([cone for _, cone, _ in contacts])
-    arms = np.repeat([point - middle for point, *_ in contacts], len(EDGES), axis=0)
+    middle = sum(x.point * x.force for x in contacts) / total
+    edges = np.vstack([x.edges for x in contacts])
+    arms = np.repeat([x.point - middle for x in contacts], len(EDGES), axis=0)
     A = np.ones((7, len(edges) + 1))
     A[:3, :-1], A[3:6, :-1] = edges.T, np.cross(arms, edges).T / ARM
     A[:6, -1] = 0.0

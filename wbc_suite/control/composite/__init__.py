@@ -17,14 +17,14 @@ from wbc_suite.control.ik.config import (
 from wbc_suite.control.ik.whole_body_ik import WholeBodyIK
 from wbc_suite.control.state import RobotState
 from wbc_suite.control.walking.config import (
-    check_dynamics,
     default_dynamics_config,
+    read_dynamics,
 )
 from wbc_suite.control.walking.whole_body_id import WholeBodyID
 
 
 def _whole_body_mink_ik(config: Mapping[str, Any], state: RobotState) -> WholeBodyIK:
-    from wbc_suite.control.ik.mink_solver import MinkBackend
+    from wbc_suite.control.ik.mink_backend import MinkBackend
 
     return WholeBodyIK(config, state, MinkBackend)
 
@@ -59,5 +59,5 @@ register_composite(
     WholeBodyID,
     family="whole_body_id",
     default=default_dynamics_config,
-    check=check_dynamics,
+    check=read_dynamics,
 )

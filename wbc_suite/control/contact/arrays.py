@@ -12,7 +12,7 @@ from wbc_suite.compiling import (
     by_address,
     compiled,
     plain,
-    readable,
+    record_type,
     struct,
 )
 from wbc_suite.control.memory import Parts
@@ -35,30 +35,28 @@ class QpStage(IntEnum):
 EDGES = 4
 """Edges of a friction pyramid."""
 
-STATE = np.dtype(
-    [
-        ("is_free", "i8"),  # 1: the root is free, and the robot stands on its feet
-        ("root_qpos", "i8"),  # index of the free root in qpos
-        ("root_dof", "i8"),  # and in qvel
-        ("body", "i8"),  # its link
-        ("mass", "f8"),  # kg; as of the last tick
-        ("friction", "f8"),  # coefficient
-        ("dt", "f8"),  # s between two steps of the loop
-        ("trust", "f8"),  # part of measured velocities' errors corrected in a step
-        ("stage", "i8"),  # `QpStage`
-        ("ticks", "i8"),
-        ("unsolved", "i8"),  # ticks whose active set was not found
-        ("fell", "f8"),  # time of the fall, s since the reset; negative before
-        ("fell_by_tilt", "i8"),  # 1: its tilt told it, 0: its height
-        ("tilt", "f8"),  # of the trunk then, rad
-        ("drop", "f8"),  # height that it had lost then, m
-        ("trunk_height", "f8"),  # of the trunk over the ground at the reset, m
-        ("hand_frame", "i8"),  # 1: goals of hands are given in the heading frame
-        ("tracks", "i8"),  # 1: the robot tracks a motion, see `Tracked`
-        ("stiffness", "f8", (2,)),  # of its position and attitude, 1/s^2
-        ("com_weight", "f8"),  # of the centre of mass that tracks
-        ("root_weight", "f8", (2,)),  # of position and attitude of the root that tracks
-    ]
+STATE = record_type(
+    ("is_free", "i8"),  # 1: the root is free, and the robot stands on its feet
+    ("root_qpos", "i8"),  # index of the free root in qpos
+    ("root_dof", "i8"),  # and in qvel
+    ("body", "i8"),  # its link
+    ("mass", "f8"),  # kg; as of the last tick
+    ("friction", "f8"),  # coefficient
+    ("dt", "f8"),  # s between two steps of the loop
+    ("trust", "f8"),  # part of measured velocities' errors corrected in a step
+    ("stage", "i8"),  # `QpStage`
+    ("ticks", "i8"),
+    ("unsolved", "i8"),  # ticks whose active set was not found
+    ("fell", "f8"),  # time of the fall, s since the reset; negative before
+    ("fell_by_tilt", "i8"),  # 1: its tilt told it, 0: its height
+    ("tilt", "f8"),  # of the trunk then, rad
+    ("drop", "f8"),  # height that it had lost then, m
+    ("trunk_height", "f8"),  # of the trunk over the ground at the reset, m
+    ("hand_frame", "i8"),  # 1: goals of hands are given in the heading frame
+    ("tracks", "i8"),  # 1: the robot tracks a motion, see `Tracked`
+    ("stiffness", "f8", (2,)),  # of its position and attitude, 1/s^2
+    ("com_weight", "f8"),  # of the centre of mass that tracks
+    ("root_weight", "f8", (2,)),  # of position and attitude of the root that tracks
 )
 
 
@@ -333,7 +331,7 @@ def _planner(planner: Planner, gait: Gait, *, feet: int) -> Planner:
 
 
 def _make_state(*, is_free: bool) -> Records:
-    state = readable(np.zeros(1, STATE))
+    state = np.zeros(1, STATE)
     state["is_free"] = is_free
     return state
 

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from pydantic import NonNegativeFloat
 
-from wbc_suite.compiling import compiled, inner, readable, struct
+from wbc_suite.compiling import compiled, inner, record_type, struct
 from wbc_suite.config_files import FrozenModel
 from wbc_suite.control.contact.arrays import (
     QpStage,
@@ -66,15 +66,13 @@ class StateSourceConfig(FrozenModel):
         return self == StateSourceConfig(seed=self.seed)
 
 
-STATE = np.dtype(
-    [
-        ("estimates", "i8"),  # 1: the root is estimated
-        ("delay", "i8"),  # steps
-        ("count", "i8"),  # steps since the start
-        ("dt", "f8"),  # s
-        ("root_qpos", "i8"),  # index of the free root in qpos
-        ("root_dof", "i8"),  # and in qvel
-    ]
+STATE = record_type(
+    ("estimates", "i8"),  # 1: the root is estimated
+    ("delay", "i8"),  # steps
+    ("count", "i8"),  # steps since the start
+    ("dt", "f8"),  # s
+    ("root_qpos", "i8"),  # index of the free root in qpos
+    ("root_dof", "i8"),  # and in qvel
 )
 
 QPOS, QVEL, FORCE, JOINTS = 0, 7, 13, 16
@@ -173,7 +171,7 @@ def make_state_source(
         foot=max(EstimatorNoise().foot, config.position_noise),
     )
     return StateSource(
-        state=readable(state),
+        state=state,
         true_qpos=data.qpos,
         true_qvel=data.qvel,
         true_xmat=data.xmat,

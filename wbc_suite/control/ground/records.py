@@ -9,7 +9,7 @@ from typing import Annotated, TypeAlias
 
 import numpy as np
 
-from wbc_suite.compiling import Record, readable
+from wbc_suite.compiling import Record
 from wbc_suite.typing import Records, Vector
 
 
@@ -140,4 +140,4 @@ def gather(pieces: Sequence[tuple[Records, Records]]) -> tuple[Records, Records]
     ends = np.cumsum([len(drive) for _, drive in pieces], dtype=np.int64)
     laws["last"] = ends
     laws["first"][1:] = ends[:-1]
-    return readable(laws), readable(drives)
+    return laws, drives

@@ -1,6 +1,6 @@
 """Config of the whole-body composites: `controllers/{robot}_whole_body_ik.toml`."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import partial
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -259,14 +259,28 @@ def read_whole_body(
             nearest name.
     """
     read = parse_model(WholeBodyIKConfig, config, source=source)
-    if robot is None:
-        return read
-    for key, kind, name, known in _names(read, robot):
+    if robot is not None:
+        check_names(_names(read, robot), robot, source)
+    return read
+
+
+def check_names(
+    names: Iterable[tuple[str, str, str, Collection[str]]],
+    robot: RobotDescription,
+    source: str,
+) -> None:
+    """Raise ConfigError for a name that a robot does not have.
+
+    Args:
+        names: Key in the file, kind of thing, name, and the names that there are.
+        robot: The robot.
+        source: What the config is called in messages.
+    """
+    for key, kind, name, known in names:
         if name not in known:
             unknown = UnknownNameError(kind, name, known)
             where = f"{source}: {located(key, source)}"
             raise ConfigError(f"{where}: {robot.name}: {unknown}")
-    return read
 
 
 def _names(

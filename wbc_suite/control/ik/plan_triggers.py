@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inline, inner, readable, struct
+from wbc_suite.compiling import compiled, compiled_inline, inner, record_type, struct
 from wbc_suite.control.ik.config import WholeBodyIKConfig
 from wbc_suite.control.ik.frame_targets import (
     FrameArrays,
@@ -46,17 +46,15 @@ class Event(IntEnum):
     """Go on with a search or a motion."""
 
 
-PROGRESS = np.dtype(
-    [
-        ("goals_changed", "i8"),  # since the last solve
-        ("is_planning", "i8"),  # whether the planner searches or leads a motion
-        ("has_searched", "i8"),  # for these goals
-        ("has_arrived", "i8"),  # level 0, at these goals
-        ("standstill", "f8"),  # s
-        ("solves", "i8"),
-        ("recorded", "i8"),  # states of the trail, ever
-        ("errors", "i8"),  # number of errors, at most those of the window
-    ]
+PROGRESS = record_type(
+    ("goals_changed", "i8"),  # since the last solve
+    ("is_planning", "i8"),  # whether the planner searches or leads a motion
+    ("has_searched", "i8"),  # for these goals
+    ("has_arrived", "i8"),  # level 0, at these goals
+    ("standstill", "f8"),  # s
+    ("solves", "i8"),
+    ("recorded", "i8"),  # states of the trail, ever
+    ("errors", "i8"),  # number of errors, at most those of the window
 )
 """State of the progress."""
 
@@ -102,7 +100,7 @@ def progress_arrays(
     not slowed.
     """
     return ProgressArrays(
-        state=readable(np.zeros(1, PROGRESS)),
+        state=np.zeros(1, PROGRESS),
         error=np.zeros(round(PROGRESS_WINDOW / dt) + 1),
         trail_time=np.zeros(TRAIL),
         trail_q=np.zeros((TRAIL, nq)),

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.control.ik.backend import IkStep
 from wbc_suite.control.ik.config import WholeBodyIKConfig
 from wbc_suite.control.ik.frame_targets import ControlledFrames
-from wbc_suite.control.ik.solver import IkStep
 from wbc_suite.control.reasons import (
     Contact,
     InMotion,

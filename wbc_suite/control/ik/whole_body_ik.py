@@ -11,6 +11,7 @@ from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.contact.arrays import Tracked
 from wbc_suite.control.contact.standing import Standing
 from wbc_suite.control.ground.feasible_acceleration import greatest_leads
+from wbc_suite.control.ik.backend import IkBackend
 from wbc_suite.control.ik.command_lead import MAX_LEAD
 from wbc_suite.control.ik.compiled_tick import TickStage, TickState, WholeBodyArrays
 from wbc_suite.control.ik.config import (
@@ -29,8 +30,7 @@ from wbc_suite.control.ik.reduced_robot import (
 )
 from wbc_suite.control.ik.report import Commanded, IkReport
 from wbc_suite.control.ik.scene_obstacles import SceneObstacles
-from wbc_suite.control.ik.solver import IkBackend
-from wbc_suite.control.ik.stack_solver import StackBackend
+from wbc_suite.control.ik.stack_backend import StackBackend
 from wbc_suite.control.ik.waypoint_planner import Waypoint, WaypointPlanner
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law

@@ -16,6 +16,7 @@ from wbc_suite.config_files import FrozenModel, located, parse_model
 from wbc_suite.control.contact.state_source import StateSourceConfig
 from wbc_suite.control.ik.config import (
     InputFrame,
+    check_names,
     default_whole_body_config,
 )
 from wbc_suite.control.ik.frame_kinds import ControlledFrame, GoalsConfig
@@ -209,32 +210,19 @@ def _suggested(robot: RobotDescription, feet: list[str]) -> str:
     return f" Its collision shapes suggest:\n\n{file}\n"
 
 
-def check_dynamics(
-    config: Mapping[str, Any], robot: RobotDescription | None, source: str
-) -> None:
-    """Raise what `read_dynamics` raises; without a robot only the format's rules."""
-    if robot is None:
-        _parse(config, source)
-    else:
-        read_dynamics(config, robot, source)
-
-
 def read_dynamics(
-    config: Mapping[str, Any], robot: RobotDescription, source: str
+    config: Mapping[str, Any], robot: RobotDescription | None, source: str
 ) -> WholeBodyIDConfig:
     """Return the config as a model.
 
     Raises:
-        ConfigError: If it breaks a rule of the format, names what the robot does not
-            have, or has feet where the root is not free.
+        ConfigError: If it breaks a rule of the format, names what the robot, if one
+            is given, does not have, or has feet where the root is not free.
     """
     read = _parse(config, source)
-    _check_root(read, robot, source)
-    for key, kind, name, known in _names(read, robot):
-        if name not in known:
-            unknown = UnknownNameError(kind, name, known)
-            where = f"{source}: {located(key, source)}"
-            raise ConfigError(f"{where}: {robot.name}: {unknown}")
+    if robot is not None:
+        _check_root(read, robot, source)
+        check_names(_names(read, robot), robot, source)
     return read
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from wbc_suite.control.ik.backend import IkBackend, IkStep, StackArrays
 from wbc_suite.control.ik.command_lead import limit_steps
 from wbc_suite.control.ik.config import WholeBodyIKConfig
 from wbc_suite.control.ik.frame_kinds import NO_SPEED_LIMIT, set_target
@@ -16,7 +17,6 @@ from wbc_suite.control.ik.qp_of_config import (
     make_limits,
     travel_costs,
 )
-from wbc_suite.control.ik.solver import IkBackend, IkStep, StackArrays
 from wbc_suite.control.ik.torque_limiter import TorqueLimiter
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.spline_reference import SplineReference

@@ -6,12 +6,14 @@ import mink
 import mujoco
 import numpy as np
 
+from wbc_suite.control.ik.backend import IkBackend, IkStep
 from wbc_suite.control.ik.config import (
     ControlledFrame,
     WholeBodyIKConfig,
 )
 from wbc_suite.control.ik.qp_of_config import TRACKING_COST, travel_costs
-from wbc_suite.control.ik.solver import IkBackend, IkStep
+from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.law.spline_reference import SplineReference
 from wbc_suite.control.poses import pose_of
 from wbc_suite.control.reasons import NoSolution, Reason
 from wbc_suite.errors import ConfigError
@@ -114,6 +116,11 @@ class MinkBackend(IkBackend):
         """Solve one tick without frames."""
         self._joints.set_target(self._conversion.q_to_mujoco(posture))
         self._take(self._solve([self._joints], dt))
+
+    def limit_steps(
+        self, reference: SplineReference, law: JointLaw, data: mujoco.MjData
+    ) -> None:
+        """Do nothing: mink's commands may lead their joints."""
 
     def last_step(self, *, in_loop: bool) -> IkStep:
         """Return the answer of the last tick."""

@@ -113,7 +113,8 @@ class IkBackend(ABC):
         """Return what ticks in the control loop need; None if Python has to solve."""
         return None
 
-    def limit_steps(  # noqa: B027, may be empty
+    @abstractmethod
+    def limit_steps(
         self, reference: SplineReference, law: JointLaw, data: mujoco.MjData
     ) -> None:
         """Limit the next step as `command_lead.limit_steps` does."""
