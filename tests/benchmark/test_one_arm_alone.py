@@ -4,7 +4,6 @@ import pytest
 from conftest import put
 
 import wbc_suite
-from wbc_suite.benchmark import predicates
 
 WAYS = [
     pytest.param(["Panda", "Panda"], "opposed", id="opposed"),
@@ -18,7 +17,8 @@ def hold(monkeypatch, task, holding):
     for hand, holds in zip(task.hands, holding, strict=True):
         for measure in ("grasps", "clamps", "bears"):
             monkeypatch.setattr(hand, measure, lambda *_, holds=holds: holds)
-    monkeypatch.setattr(predicates, "bear", lambda *_: True)
+        force = 100.0 if holds else 0.0
+        monkeypatch.setattr(hand, "friction", lambda *_, force=force: force)
     holders = [hand for hand, holds in zip(task.hands, holding, strict=True) if holds]
     monkeypatch.setattr(task.scene, "hands_at", lambda _: holders)
 

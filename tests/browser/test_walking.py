@@ -88,6 +88,7 @@ def test_closing_a_page_with_a_key_held_stops_the_robot(walker, context):
     session, page = walker
     session.reset()
     viewer = Viewer(context, page.site, size=(760, 440), dots=0.3)
+    viewer.page.get_by_role("button", name="forward", exact=True).wait_for()
     viewer.page.keyboard.down("s")
     wait_until(lambda: moves(session, 0, -1), "it walks")
     viewer.page.close()

@@ -122,7 +122,7 @@ class QpsolversSolver:
                 solution = qpsolvers.solve_problem(  # pyright: ignore[reportUnknownMemberType]
                     qp, self.name, **self._OPTIONS.get(self.name, {})
                 )
-        except (qpsolvers.exceptions.QPError, ValueError, ArithmeticError):
+        except Exception:  # noqa: BLE001 - each solver raises errors of its own
             return None
         if not solution.found or solution.x is None or solution.z_box is None:
             return None
