@@ -58,6 +58,13 @@ def wait_until(condition, what, patience=PATIENCE):
     raise AssertionError(f"waited {patience:g} s in vain: {what}")
 
 
+def soon(condition):
+    deadline = time.monotonic() + PATIENCE / TRIES
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return condition()
+
+
 class Viewer:
     """One browser page, and the client that it is for the server.
 
@@ -147,13 +154,19 @@ class Viewer:
         for _ in range(TRIES):
             _, start, along = grip()
             self.drag(start, sign * along, pixels, release=release, steps=steps)
-            deadline = time.monotonic() + PATIENCE / TRIES
-            while time.monotonic() < deadline:
-                if took():
-                    return
-                time.sleep(0.02)
+            if soon(took):
+                return
             self.page.mouse.up()
         raise AssertionError(f"dragged {TRIES} times in vain")
+
+    def hold_key_until(self, works, key):
+        """Hold a key; again where the page had not connected yet, as a person does."""
+        for _ in range(TRIES):
+            self.page.keyboard.down(key)
+            if soon(works):
+                return
+            self.page.keyboard.up(key)
+        raise AssertionError(f"pressed {key} {TRIES} times in vain")
 
     def screenshot(self, name):
         ARTIFACTS.mkdir(exist_ok=True)

@@ -38,8 +38,8 @@ def test_keys_and_buttons_walk_while_held_and_a_fall_can_be_reset(walker, contex
     wait_until(lambda: session.snapshot.balance is not None, "the balance is shown")
     camera = viewer.client.camera.position.copy()
 
-    keyboard.down("s")
     start = place(session)
+    viewer.hold_key_until(lambda: moves(session, 0, -1), "s")
     wait_until(lambda: (place(session) - start)[0] < -0.4, "it walks backwards")
     tab.get_by_text("m/s back").wait_for()
     wait_until(lambda: session.snapshot.balance.footstep is not None, "it steps")
@@ -89,8 +89,7 @@ def test_closing_a_page_with_a_key_held_stops_the_robot(walker, context):
     session.reset()
     viewer = Viewer(context, page.site, size=(760, 440), dots=0.3)
     viewer.page.get_by_role("button", name="forward", exact=True).wait_for()
-    viewer.page.keyboard.down("s")
-    wait_until(lambda: moves(session, 0, -1), "it walks")
+    viewer.hold_key_until(lambda: moves(session, 0, -1), "s")
     viewer.page.close()
     wait_until(lambda: stands(session), "it stops")
     assert np.linalg.norm(session.snapshot.velocity) == 0.0
