@@ -3,7 +3,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -77,11 +77,29 @@ def export_robot(
     robot: options.RobotArgument,
     *,
     to: Annotated[
-        Literal["mjcf", "urdf", "toml"], typer.Option(help="Format to write.")
-    ],
+        Literal["mjcf", "urdf", "toml"] | None,
+        typer.Option(help="Format of one file to write."),
+    ] = None,
+    reader: Annotated[
+        Literal["pybullet", "ros2", "isaac", "drake", "pinocchio"] | None,
+        typer.Option("--for", help="Reader to write a folder of files for."),
+    ] = None,
+    root: Annotated[
+        Literal["none", "fixed", "planar", "floating"] | None,
+        typer.Option(
+            help="Joint between the world and a URDF's first link; 'none' leaves it to "
+            "the reader. By default the robot's own, and with --for 'none' for free "
+            "robots."
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="File to write; otherwise it is printed."),
+        typer.Option(
+            "--output",
+            "-o",
+            help="File to write, otherwise it is printed; with --for a folder, "
+            "READER/ROBOT by default.",
+        ),
     ] = None,
     mesh_root: options.MeshRootOption = None,
     strict: options.StrictOption = False,
@@ -91,11 +109,27 @@ def export_robot(
 ) -> None:
     """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit.
 
-    A URDF gets a folder with meshes beside it for shapes that URDF lacks.
+    --to writes one file in a format. A URDF gets a folder with meshes beside it for
+    shapes that URDF lacks.
+
+    --for writes all that one reader takes: pybullet a URDF with all masses stated;
+    pinocchio a URDF, and an SRDF with postures, rotor inertias and disabled pairs;
+    drake a URDF with accelerations, rotor inertias, gains and collision filters; ros2
+    a description package with ros2_control, SRDF and controllers; isaac a URDF with
+    cameras, and an MJCF that becomes USD. It prints how to load them.
+
+    Examples: wbc-suite export G1 --to urdf --root none -o g1.urdf;
+    wbc-suite export Panda --for ros2 -o ws/src
     """
     from wbc_suite.atomic_files import write_bytes
     from wbc_suite.robot import load_robot
 
+    if (to is None) == (reader is None):
+        raise ConfigError("Give either --to FORMAT or --for READER.")
+    if root is not None and to in ("mjcf", "toml"):
+        raise ConfigError(
+            f"--root is for URDF; with --to {to} there is none to choose."
+        )
     description = load_robot(
         robot,
         gripper=options.chosen(gripper),
@@ -103,16 +137,23 @@ def export_robot(
         mesh_root=mesh_root,
         strict=strict,
     )
+    if reader is not None:
+        from wbc_suite.robot.readers.export import export_for
+
+        folder = output or Path(reader) / description.name
+        hint = export_for(description, reader, folder, root=root)
+        print(f"Wrote {folder}. To load it:\n{hint}")
+        return
+    given: dict[str, Any] = {"root": root} if root else {}
+    write = getattr(description, f"to_{to}")
     if output is None:
-        sys.stdout.write(getattr(description, f"to_{to}")() + "\n")  # as it is
+        sys.stdout.write(write(**given) + "\n")  # as it is
         return
     if not output.parent.is_dir():
         raise ConfigError(f"'{output}' cannot be written: no folder '{output.parent}'.")
     if to == "urdf":
-        meshes = output.with_name(f"{output.stem}_meshes")
-        text = description.to_urdf(mesh_dir=meshes)
-    else:
-        text = getattr(description, f"to_{to}")()
+        given["mesh_dir"] = output.with_name(f"{output.stem}_meshes")
+    text = write(**given)
     write_bytes(output, text.encode())
     print(f"Wrote {output} ({len(text) / 1000:.0f} kB).")
 

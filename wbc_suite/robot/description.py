@@ -8,7 +8,15 @@ from pydantic import Field, model_validator
 
 from wbc_suite.config_files import parse_model
 from wbc_suite.errors import DescriptionError, look_up
-from wbc_suite.robot.elements import Elements, Frame, Joint, Link, Name, Synergy
+from wbc_suite.robot.elements import (
+    Elements,
+    Frame,
+    Joint,
+    Link,
+    Name,
+    Synergy,
+    UrdfRoot,
+)
 from wbc_suite.robot.shapes import Shape, SkinMesh
 from wbc_suite.robot.validation import check_description
 
@@ -163,15 +171,18 @@ class RobotDescription(Elements):
 
         return build_pinocchio(self)
 
-    def to_urdf(self, *, mesh_dir: "Path | None" = None) -> str:
+    def to_urdf(
+        self, *, mesh_dir: "Path | None" = None, root: UrdfRoot | None = None
+    ) -> str:
         """Return the robot as URDF text; `write_urdf` lists what is converted.
 
         Shapes that URDF lacks become boxes, or STL files in `mesh_dir`, which the text
-        names relative to the folder's parent.
+        names relative to the folder's parent. `root` is the joint between the world and
+        the first link, the robot's own by default; `none` leaves it to the reader.
         """
         from wbc_suite.robot.urdf_export import write_urdf
 
-        return write_urdf(self, mesh_dir=mesh_dir)
+        return write_urdf(self, mesh_dir=mesh_dir, root=root)
 
     def to_toml(self) -> str:
         """Return the robot as one component file (TOML), without loss."""

@@ -298,6 +298,10 @@ class Root(Posed):
         )
 
 
+UrdfRoot: TypeAlias = Literal["none", "fixed", "planar", "floating"]
+"""URDF joint between a link `world` and the first; `none` leaves both to the reader."""
+
+
 class Elements(FrozenModel):
     """The elements of a component and of a robot; keys of tables are singular."""
 

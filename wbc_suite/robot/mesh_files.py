@@ -8,7 +8,7 @@ from contextlib import suppress
 from functools import cached_property
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -61,9 +61,17 @@ def _common_end(one: Path, other: Path) -> int:
 
 def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:
     """Write triangles, shape (m, 3) into vertices (n, 3), as a binary STL file."""
+    write_mesh(path, vertices, faces, kind="stl")
+
+
+def write_mesh(
+    path: Path, vertices: Matrix, faces: Indices, *, kind: Literal["stl", "obj"]
+) -> None:
+    """Write triangles, shape (m, 3) into vertices (n, 3), as binary STL or OBJ."""
     mesh = _trimesh().Trimesh(vertices, faces, process=False)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(mesh.export(file_type="stl"))
+    content = mesh.export(file_type=kind)
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def can_read(path: Path) -> bool:

@@ -1,16 +1,20 @@
 """Build the MuJoCo model of a robot from its description."""
 
 from collections.abc import Iterable
+from pathlib import Path
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 import pinocchio as pin
+from scipy.spatial import ConvexHull
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Actuator, Joint, rigid_bodies
-from wbc_suite.robot.inertia import inertia_fields, inertia_of
+from wbc_suite.robot.inertia import inertia_fields
+from wbc_suite.robot.mesh_files import write_stl
 from wbc_suite.robot.mjcf_export_geoms import VisualGeoms, add_collision_geoms
-from wbc_suite.robot.poses import poses_in_rigid_bodies
+from wbc_suite.robot.moving_inertias import moving_inertias
 
 STOP_SOLREF = (0.004, 1.0)
 """Time constant in s and damping ratio of joint limits, the stiffest that is stable
@@ -55,7 +59,7 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     spec.compiler.degree = False
     spec.compiler.savecompiled = False
     bodies = {"world": spec.worldbody}
-    inertias = _inertias(robot)
+    inertias = moving_inertias(robot)
     margins = _margins(robot)
     visual = VisualGeoms(spec, robot, merged=merged)
     for link in robot.links:
@@ -96,11 +100,27 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     return spec
 
 
-def write_mjcf(robot: RobotDescription) -> str:
-    """Return MJCF text with all digits, with one geom per visual shape."""
+def write_mjcf(robot: RobotDescription, *, mesh_dir: Path | None = None) -> str:
+    """Return MJCF text with all digits, with one geom per visual shape.
+
+    Meshes are in the text, or in STL files in `mesh_dir`, which the text names relative
+    to the folder's parent.
+    """
     spec = build_mjspec(robot, merged=False)
     spec.compile()
-    return spec.to_xml()
+    if mesh_dir is None:
+        return spec.to_xml()
+    tree = ElementTree.fromstring(spec.to_xml())
+    for mesh in tree.iterfind("asset/mesh"):
+        vertices = np.array(mesh.attrib.pop("vertex").split(), np.float64)
+        faces = np.array(mesh.attrib.pop("face", "").split(), np.int64)
+        vertices = vertices.reshape(-1, 3)
+        if not len(faces):
+            faces = ConvexHull(vertices).simplices.astype(np.int64)
+        file = f"{mesh_dir.name}/{mesh.get('name')}.stl"
+        write_stl(mesh_dir.parent / file, vertices, faces.reshape(-1, 3))
+        mesh.set("file", file)
+    return ElementTree.tostring(tree, "unicode") + "\n"
 
 
 def _margins(robot: RobotDescription) -> dict[str, float]:
@@ -136,26 +156,6 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint, *, margin: float) -> None:
         added.range = joint.range
         if joint.type == "hinge":
             added.margin = margin
-
-
-def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:
-    """Return the inertias of the links in their axes.
-
-    MuJoCo needs mass on each moving body: one without gets that of links fixed to it.
-    """
-    inertias = {link.name: inertia_of(link) for link in robot.links}
-    rigid = rigid_bodies(robot.links)
-    placement = poses_in_rigid_bodies(robot.links)
-    for link in robot.links:
-        owner = rigid[link.name]
-        if owner == link.name:
-            continue
-        moves = owner != robot.links[0].name or robot.root.kind != "fixed"
-        light = robot.link(owner).mass == 0.0 or link.mass == 0.0
-        if moves and light and any((link.mass, *link.inertia)):
-            inertias[owner] += placement[link.name].act(inertias[link.name])
-            inertias[link.name] = pin.Inertia.Zero()
-    return inertias
 
 
 def _set_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:

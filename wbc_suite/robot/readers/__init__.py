@@ -1,0 +1,1 @@
+"""What a robot is written as for one reader: URDF dialects, SRDF, ROS 2, USD."""
