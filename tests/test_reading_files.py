@@ -16,9 +16,10 @@ from wbc_suite.executors.results import ResultFolder, WorkItem
 from wbc_suite.files import check_file, open_file, read_bytes, read_text
 from wbc_suite.recording.hdf5_check import open_safely
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.mesh_files import read_points, skin_triangles
+from wbc_suite.robot.mesh_files import read_points
 from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.shapes import SkinMesh
+from wbc_suite.robot.surfaces import skin_triangles
 from wbc_suite.web.certificate import fingerprint, server_context
 
 READERS = {

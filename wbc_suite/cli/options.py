@@ -49,8 +49,9 @@ RootOption = Annotated[
 SkinOption = Annotated[
     str | None,
     typer.Option(
-        metavar="meshes|DIR",
-        help="Draw with real meshes, from installed packages or from a folder.",
+        metavar="meshes|DIR|none",
+        help="Draw with real meshes, from installed packages or from a folder; "
+        "files have their own, which none leaves out.",
     ),
 ]
 MeshRootOption = Annotated[

@@ -28,7 +28,7 @@ from wbc_suite.robot.robot_file import (
     is_path,
     read_robot_file,
 )
-from wbc_suite.robot.shapes import SkinMesh
+from wbc_suite.robot.shapes import Drawn
 from wbc_suite.robot.skins import SkinFinder
 
 TABLES = ("groups", "keyframes", "materials", "synergies", "skins")
@@ -56,7 +56,7 @@ def _skins(
     skins: SkinFinder | None,
     prefix: str = "",
     colors: Mapping[str, str] | None = None,
-) -> dict[str, tuple[SkinMesh, ...]]:
+) -> dict[str, tuple[Drawn, ...]]:
     """Return the meshes of a component's links, with prefixed names."""
     if skins is None:
         return {}

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from wbc_suite.errors import look_up
 from wbc_suite.robot.elements import Link
 from wbc_suite.robot.poses import joint_motion, pose_fields, se3_of
-from wbc_suite.robot.shapes import Shape, SkinMesh
+from wbc_suite.robot.shapes import Drawn, Shape
 
 LISTS = ("frames", "cameras", "actuators", "sensors", "connects", "tendons")
 """Lists of a component that are joined in an assembly."""
@@ -17,7 +17,7 @@ LISTS = ("frames", "cameras", "actuators", "sensors", "connects", "tendons")
 if TYPE_CHECKING:
     from wbc_suite.robot.robot_file import Component
 
-S = TypeVar("S", bound=Shape | SkinMesh)
+S = TypeVar("S", bound=Shape | Drawn)
 M = TypeVar("M", bound=BaseModel)
 
 

@@ -17,7 +17,7 @@ from wbc_suite.robot.elements import (
     Synergy,
     UrdfRoot,
 )
-from wbc_suite.robot.shapes import Shape, SkinMesh
+from wbc_suite.robot.shapes import Drawn
 from wbc_suite.robot.validation import check_description
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class RobotDescription(Elements):
     license: str = ""
     deviations: tuple[str, ...] = ()
     synergies: dict[Name, tuple[Synergy, ...]] = {}
-    skins: dict[Name, tuple[SkinMesh, ...]] = Field(default={}, exclude=True)
+    skins: dict[Name, tuple[Drawn, ...]] = Field(default={}, exclude=True)
 
     @model_validator(mode="after")
     def _check(self) -> "RobotDescription":
@@ -125,7 +125,7 @@ class RobotDescription(Elements):
         """Return a frame by name; raises UnknownNameError."""
         return look_up("frame", name, {frame.name: frame for frame in self.frames})
 
-    def drawn(self, link: Link) -> tuple[Shape | SkinMesh, ...]:
+    def drawn(self, link: Link) -> tuple[Drawn, ...]:
         """Return the skin of a link, or else its visual shapes."""
         return self.skins.get(link.name, link.visual)
 

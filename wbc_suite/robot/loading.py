@@ -10,7 +10,7 @@ from wbc_suite.robot.assembly import assemble, describe_component
 from wbc_suite.robot.component_choice import Choice
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.robot_file import Component, read_robot_file
-from wbc_suite.robot.skins import SkinFinder
+from wbc_suite.robot.skins import PLAIN, SkinFinder
 from wbc_suite.typing import RobotName
 
 LOG = logs.logger(__name__)
@@ -42,9 +42,9 @@ def load_robot(
         root: Another root: `fixed`, `planar` or `free`. A URDF that does not connect
             its first link to a link `world` is free if it has four feet or more, else
             fixed. A free robot that has hands, but no feet, is planar.
-        skin: "meshes" draws the robot with meshes of installed packages, or of its
-            URDF; a folder with those found there, see `robot.skins`. Physics does not
-            change.
+        skin: "meshes" draws the robot with meshes of installed packages; a folder with
+            those found there, see `robot.skins`. A URDF or MJCF file is drawn with its
+            own meshes, and with hulls of these by "none". Physics does not change.
         mesh_root: Folder that a URDF or MJCF file may read meshes from; by default the
             package or model folder around it.
         strict: Refuse a URDF or MJCF file with faults that are mended with a warning
@@ -66,14 +66,14 @@ def load_robot(
         raise UnknownNameError("robot", name, catalogue.called("robots"))
     path = _locate(str(name), catalogue)
     if path.suffix == ".toml":
-        skins = None if skin is None else SkinFinder(skin, catalogue)
+        skins = None if skin in (None, PLAIN) else SkinFinder(skin, catalogue)
         robot = _read(path, catalogue, gripper=gripper, base=base, skins=skins)
         if skins is not None:
             skins.report_missing()
     elif gripper is not None or base is not None:
         raise ConfigError(f"{path}: 'gripper' and 'base' need an assembly file.")
     else:
-        robot = _import(path, skin is not None, mesh_root=mesh_root, strict=strict)
+        robot = _import(path, skin, mesh_root=mesh_root, strict=strict)
     if root not in (None, robot.root.kind):
         robot = robot.with_root(root)
     if path.suffix == ".toml" or robot.root.kind != "free":
@@ -139,16 +139,18 @@ def _read(
 
 
 def _import(
-    path: Path, skin: bool, *, mesh_root: str | Path | None, strict: bool
+    path: Path,
+    skin: str | Path | None,
+    *,
+    mesh_root: str | Path | None,
+    strict: bool,
 ) -> RobotDescription:
+    drawn = skin != PLAIN
     if path.suffix.lower() == ".urdf":
-        from wbc_suite.robot.urdf_import import read_urdf
-
-        robot = read_urdf(path, mesh_root=mesh_root, strict=strict, skin=skin)
+        from wbc_suite.robot.urdf_import import read_urdf as read
     else:
-        from wbc_suite.robot.mjcf_import import read_mjcf
-
-        robot = read_mjcf(path, mesh_root=mesh_root, strict=strict)
-    if skin and not robot.skins:
+        from wbc_suite.robot.mjcf_import import read_mjcf as read
+    robot = read(path, mesh_root=mesh_root, strict=strict, skin=drawn)
+    if skin is not None and drawn and not robot.skins:
         raise ConfigError(f"{path}: skin: no link is drawn by meshes that were found.")
     return robot

@@ -1,10 +1,7 @@
-"""Mesh files (STL, OBJ): write, read points, and read the meshes of skins."""
+"""Mesh files (STL, OBJ, COLLADA, glTF): find, read and write them."""
 
-import hashlib
 import importlib.util
 import io
-import os
-from contextlib import suppress
 from functools import cached_property
 from itertools import islice, takewhile
 from pathlib import Path
@@ -12,22 +9,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from wbc_suite.catalogue import user_cache
 from wbc_suite.errors import ConfigError, DescriptionError
-from wbc_suite.files import check_file, read_bytes
-from wbc_suite.robot.shapes import SkinMesh, Vector3, cached_by_shape
+from wbc_suite.files import read_bytes
 from wbc_suite.typing import Indices, Matrix
 
 READABLE = (".stl", ".obj", ".glb")  # suffixes of the files that need no extra
 COLLADA = ".dae"
 MAX_BYTES = 100_000_000  # largest mesh file that is read
 MAX_FILES = 20_000  # of a folder that is searched for meshes
-
-EDGE = 0.008
-"""Edge length in m to which skins are decimated; finer meshes render slowly."""
-MIN_TRIANGLES = 400  # number of triangles below which a skin is not decimated
-AGGRESSION = 5.0  # how quickly edges are collapsed; the default of 7 tears thin shells
-CACHE_VERSION = 1  # raised when the content of the cache changes
 
 
 class MeshIndex:
@@ -89,7 +78,8 @@ def read_points(path: Path) -> Matrix:
     """
     data = read_bytes(path, most=MAX_BYTES, error=DescriptionError)
     try:
-        points = _vertices(_loaded(path, data))
+        mesh = load_mesh(path, data)
+        points = np.asarray(mesh.vertices, np.float64) * unit_of(mesh)
     except Exception as error:  # trimesh raises anything for a malformed file
         raise DescriptionError(f"{path}: not a readable mesh: {error}.") from error
     if points.shape[1:] != (3,) or not len(points) or not np.isfinite(points).all():
@@ -102,90 +92,27 @@ def _trimesh() -> Any:
     return importlib.import_module("trimesh")
 
 
-def _loaded(path: Path, data: bytes) -> Any:
+def load_mesh(path: Path, data: bytes) -> Any:
     """Return trimesh's mesh of a file, or its points if it has no faces."""
+    return load_scene(path, data, skip_materials=True).to_geometry()
+
+
+def load_scene(path: Path, data: bytes, **options: Any) -> Any:
+    """Return trimesh's scene of a file; raises anything for a malformed one."""
     if path.suffix.lower() == COLLADA:
         _import_extra("collada")
     # by its content, since trimesh would open the files that a path's file names
     kind = path.suffix[1:].lower()
     with np.errstate(invalid="ignore"):  # of NaN, which is refused
-        scene = _trimesh().load_scene(
-            io.BytesIO(data), file_type=kind, process=False, skip_materials=True
+        return _trimesh().load_scene(
+            io.BytesIO(data), file_type=kind, process=False, **options
         )
-        return scene.to_geometry()
 
 
-@cached_by_shape
-def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
-    """Return vertices (n, 3) in the shape's frame and faces (m, 3), decimated.
-
-    Results are kept in the user's cache folder.
-
-    Raises:
-        ConfigError: If the file is not a mesh, or the extra `skins` is not installed.
-    """
-    path = Path(shape.file)
-    state = check_file(path, most=MAX_BYTES)
-    key = f"{CACHE_VERSION} {path} {state.st_size} {state.st_mtime_ns} {shape.scale}"
-    name = hashlib.sha256(key.encode()).hexdigest()[:32]
-    kept = user_cache() / "skins" / f"{name}.npz"
-    try:
-        with np.load(kept, allow_pickle=False) as data:
-            vertices, faces = _checked(data["vertices"], data["faces"])
-    except Exception:  # noqa: BLE001  (numpy raises anything for a damaged file)
-        vertices, faces = _decimated(*_read_mesh(path, shape.scale))
-        with suppress(OSError):  # the folder cannot be written
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            part = kept.with_suffix(f".{os.getpid()}.npz")
-            np.savez_compressed(part, vertices=vertices.astype(np.float32), faces=faces)
-            part.replace(kept)
-    return vertices.astype(np.float64), faces.astype(np.int64)
-
-
-def _read_mesh(path: Path, scale: Vector3) -> tuple[Matrix, Indices]:
-    """Read a file; equal points are merged, so that decimation keeps the surface."""
-    data = read_bytes(path, most=MAX_BYTES)
-    try:
-        mesh = _loaded(path, data)
-        mesh.merge_vertices(merge_tex=True, merge_norm=True)
-        # a reflection turns the faces inside out
-        faces = mesh.faces[:, ::-1] if np.prod(scale) < 0.0 else mesh.faces
-        return _checked(_vertices(mesh) * scale, np.asarray(faces))
-    except Exception as error:  # trimesh raises anything for a malformed file
-        raise ConfigError(f"{path}: not a readable mesh: {error}.") from error
-
-
-def _vertices(mesh: Any) -> Matrix:
-    """Return the vertices of trimesh's mesh, m."""
+def unit_of(mesh: Any) -> float:
+    """Return the length in m of the unit of trimesh's mesh."""
     factor, times, _ = str(mesh.units).partition(" * ")  # "0.0254 * meters"
-    return np.asarray(mesh.vertices, np.float64) * (float(factor) if times else 1.0)
-
-
-def _checked(vertices: Matrix, faces: Indices) -> tuple[Matrix, Indices]:
-    """Return triangles; raises ValueError if they are none."""
-    shapes = vertices.shape[1:] == faces.shape[1:] == (3,)
-    if not (shapes and faces.size and np.isfinite(vertices).all()):
-        raise ValueError("no finite triangles")
-    if len(vertices) < 4:
-        raise ValueError("fewer than 4 vertices, which MuJoCo refuses")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise ValueError("triangles of vertices that it lacks")
-    return vertices, faces
-
-
-def _decimated(vertices: Matrix, faces: Indices) -> tuple[Matrix, Indices]:
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    target = max(MIN_TRIANGLES, round(area / (0.433 * EDGE**2)))
-    if target >= len(faces):
-        return vertices, faces
-    points, triangles = _import_extra("fast_simplification").simplify(
-        vertices.astype(np.float32),
-        faces.astype(np.int32),
-        target_count=target,
-        agg=AGGRESSION,
-    )
-    return np.asarray(points), np.asarray(triangles)
+    return float(factor) if times else 1.0
 
 
 def _import_extra(name: str) -> Any:

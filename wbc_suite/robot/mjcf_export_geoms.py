@@ -18,10 +18,10 @@ from wbc_suite.robot.shapes import (
     Box,
     Capsule,
     Cylinder,
+    Drawn,
     Ellipsoid,
     Posed,
-    Shape,
-    SkinMesh,
+    Rgba,
     Sphere,
 )
 from wbc_suite.robot.triangle_meshes import (
@@ -45,9 +45,6 @@ sinks 0.2 mm into a cube of 0.1 kg, and 3.4 mm with equal weights."""
 GREY = (0.5, 0.5, 0.52, 1.0)
 PALETTE = "palette"
 ROW = 4  # row alignment of OpenGL textures, in pixels
-
-Drawn = Shape | SkinMesh
-Rgba = tuple[float, float, float, float]
 
 
 def add_collision_geoms(

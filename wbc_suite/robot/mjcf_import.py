@@ -33,8 +33,10 @@ from wbc_suite.robot.mjcf_import_elements import (
     read_excludes,
     read_keyframes,
     read_shapes,
+    read_skin,
 )
 from wbc_suite.robot.poses import joint_motion, pose_at, pose_fields
+from wbc_suite.robot.shapes import Drawn
 from wbc_suite.typing import Vector
 
 LOG = logs.logger(__name__)
@@ -48,23 +50,28 @@ SENSOR_KINDS = {int(code): kind for kind, code in SENSOR_TYPES.items()}
 
 
 def read_mjcf(
-    path: Path | str, *, mesh_root: Path | str | None = None, strict: bool = False
+    path: Path | str,
+    *,
+    mesh_root: Path | str | None = None,
+    strict: bool = False,
+    skin: bool = True,
 ) -> RobotDescription:
     """Read an MJCF file.
 
     MuJoCo compiles it. Bodies become links, sites become frames, joint equalities
-    become mimic joints, meshes become convex hulls. A body with several joints becomes
-    a chain with links of 1e-10 kg; a ball joint becomes three hinges about x, y and
-    z. Springs, tendons, gravity compensation and closed loops act in MuJoCo only. Items
-    of the world body (floors, lights) are ignored, and so are free objects beside a
-    robot. Groups and end effectors are inferred; `to_toml()` writes the result for
-    editing.
+    become mimic joints. Meshes are drawn, and collide as convex hulls. A body with
+    several joints becomes a chain with links of 1e-10 kg; a ball joint becomes three
+    hinges about x, y and z. Springs, tendons, gravity compensation and closed loops act
+    in MuJoCo only. Items of the world body (floors, lights) are ignored, and so are
+    free objects beside a robot. Groups and end effectors are inferred; `to_toml()`
+    writes the result for editing.
 
     Args:
         path: The file.
         mesh_root: Folder that all files must lie in; by default the package or model
             folder that encloses the file.
         strict: Refuse what is left out or mended with a warning otherwise.
+        skin: Draw links with their meshes, not with the hulls of these.
 
     Raises:
         ConfigError: If the file is not MJCF, or refers to files outside the folder.
@@ -75,7 +82,10 @@ def read_mjcf(
     m, _ = compile_mjcf(path, root=mesh_root)
     if not _world_children(m):
         raise DescriptionError(f"{path}: the model has no body.")
-    robot = _Importer(m, path, strict=strict).robot()
+    importer = _Importer(m, path, strict=strict)
+    robot = importer.robot()
+    if skin:
+        robot = robot.model_copy(update={"skins": importer.skins()})
     return exclude_contacts(robot, path)
 
 
@@ -157,6 +167,16 @@ class _Importer:
             ),
             contacts={"exclude": list(read_excludes(m, self._bodies))},
         )
+
+    def skins(self) -> dict[str, tuple[Drawn, ...]]:
+        """Return what draws the links with meshes, by their names."""
+        file = str(self._path.absolute())
+        found = {
+            name: read_skin(self._m, b, self._offsets[b], file)
+            for b, name in self._bodies.items()
+            if b
+        }
+        return {name: drawn for name, drawn in found.items() if drawn}
 
     def _name_items(self, rooted: int | None) -> None:
         """Name the bodies and joints of the robot; those of the root have no name."""

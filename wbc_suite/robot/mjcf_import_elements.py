@@ -1,19 +1,25 @@
 """Read geoms and actuators of a compiled MuJoCo model as fields of a description."""
 
+import math
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 import pinocchio as pin
+from pydantic import TypeAdapter
 
 from wbc_suite import logs
 from wbc_suite.robot.adopt.importing import NameTable
 from wbc_suite.robot.poses import pose_at, pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
+from wbc_suite.robot.shapes import Drawn
+from wbc_suite.robot.surfaces import surfaces_of_triangles, texels
 from wbc_suite.typing import Vector
 
 LOG = logs.logger(__name__)
+
+_DRAWN: TypeAdapter[Drawn] = TypeAdapter(Drawn)
 
 VISUAL_GROUPS = 3  # groups 0, 1 and 2 are drawn, as in MuJoCo's own viewer
 GEOM = mujoco.mjtGeom
@@ -32,18 +38,92 @@ def read_shapes(
     """
     visual: list[dict[str, Any]] = []
     collision: list[dict[str, Any]] = []
-    for g in np.flatnonzero(m.geom_bodyid == body).tolist():
-        if int(m.geom_type[g]) in TERRAINS:
-            continue
+    drawn = _drawn_geoms(m, body)
+    for g in _geoms(m, body):
         shape = _shape(m, g)
         own = pin.SE3(np.eye(3), np.asarray(shape.pop("pos", np.zeros(3))))
         pose = pose_at(m.geom_pos[g] + offset, m.geom_quat[g]) * own
         shape |= pose_fields(pose)
-        if m.geom_group[g] < VISUAL_GROUPS:
+        if g in drawn:
             visual.append(shape | {"color": _color(m, g)})
         if m.geom_contype[g] or m.geom_conaffinity[g]:
             collision.append(shape | _contact(m, g))
     return {"visual": visual, "collision": collision}
+
+
+def _geoms(m: mujoco.MjModel, body: int) -> list[int]:
+    own = np.flatnonzero(m.geom_bodyid == body).tolist()
+    return [g for g in own if int(m.geom_type[g]) not in TERRAINS]
+
+
+def _drawn_geoms(m: mujoco.MjModel, body: int) -> list[int]:
+    """Return the geoms of a body that are drawn.
+
+    If a body has groups of geoms that never collide, those of its groups that only
+    collide are not drawn.
+    """
+    drawn = [g for g in _geoms(m, body) if m.geom_group[g] < VISUAL_GROUPS]
+    free = {
+        int(m.geom_group[g])
+        for g in drawn
+        if not (m.geom_contype[g] or m.geom_conaffinity[g])
+    }
+    return [g for g in drawn if not free or int(m.geom_group[g]) in free]
+
+
+def read_skin(
+    m: mujoco.MjModel, body: int, offset: Vector, file: str
+) -> tuple[Drawn, ...]:
+    """Return what draws a body with meshes, placed in its link; empty without one."""
+    drawn: list[dict[str, Any]] = []
+    for g in _drawn_geoms(m, body):
+        own = [{"shape": "skin", "file": file, **fields} for fields in _surfaces(m, g)]
+        pose = pose_at(m.geom_pos[g] + offset, m.geom_quat[g])
+        if not own:
+            own = [_shape(m, g) | {"color": _color(m, g)}]
+            pose = pose * pin.SE3(np.eye(3), np.asarray(own[0].pop("pos", np.zeros(3))))
+        drawn += [fields | pose_fields(pose) for fields in own]
+    if all(shape["shape"] != "skin" for shape in drawn):
+        return ()
+    return tuple(map(_DRAWN.validate_python, drawn))
+
+
+def _surfaces(m: mujoco.MjModel, g: int) -> list[dict[str, Any]]:
+    """Return the mesh of a geom by its colours; empty for other geoms."""
+    mesh = int(m.geom_dataid[g])
+    if m.geom_type[g] != GEOM.mjGEOM_MESH or m.mesh_facenum[mesh] == 0:
+        return []
+    first, count = m.mesh_vertadr[mesh], m.mesh_vertnum[mesh]
+    start, end = m.mesh_faceadr[mesh], m.mesh_faceadr[mesh] + m.mesh_facenum[mesh]
+    vertices, faces = m.mesh_vert[first : first + count], m.mesh_face[start:end]
+    stated, pixels = _color(m, g), _pixels(m, int(m.geom_matid[g]))
+    colors = None
+    if pixels is not None and m.mesh_texcoordadr[mesh] >= 0:
+        corners = m.mesh_texcoordadr[mesh] + m.mesh_facetexcoord[start:end]
+        # MuJoCo counts rows of a picture from below
+        centres = m.mesh_texcoord[corners].mean(axis=1) * (1.0, -1.0)
+        colors = texels(pixels, centres) * stated[:3]
+    elif pixels is not None:
+        mean = pixels.mean(axis=(0, 1)) / 255.0
+        stated = [*(mean * stated[:3]).tolist(), stated[3]]
+    try:
+        found = surfaces_of_triangles(vertices, faces, colors)
+    except ValueError:  # MuJoCo draws what has no area, too
+        return []
+    return [{"surface": own, "color": own.color or stated} for own in found]
+
+
+def _pixels(m: mujoco.MjModel, material: int) -> Any:
+    """Return the flat texture of a material, shape (height, width, 3); None without."""
+    role = mujoco.mjtTextureRole.mjTEXROLE_RGB
+    texture = -1 if material < 0 else int(m.mat_texid[material, role])
+    if texture < 0 or m.tex_nchannel[texture] < 3:
+        return None
+    if m.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D:
+        return None
+    first, channels = m.tex_adr[texture], int(m.tex_nchannel[texture])
+    shape = int(m.tex_height[texture]), int(m.tex_width[texture]), channels
+    return m.tex_data[first : first + math.prod(shape)].reshape(shape)[..., :3]
 
 
 def _shape(m: mujoco.MjModel, g: int) -> dict[str, Any]:

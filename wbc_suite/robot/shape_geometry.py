@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.errors import DescriptionError
-from wbc_suite.robot.mesh_files import skin_triangles
 from wbc_suite.robot.poses import compose, rotation_matrix
 from wbc_suite.robot.shapes import (
     Box,
@@ -26,6 +25,7 @@ from wbc_suite.robot.shapes import (
     Sphere,
     cached_by_shape,
 )
+from wbc_suite.robot.surfaces import skin_triangles
 from wbc_suite.typing import Indices, Matrix, Vector
 
 RING_POINTS = 24  # points on one ring of a loft or a cone; half as many on a small one

@@ -4,15 +4,18 @@ Lengths are in metres, poses in the link frame, quaternions w x y z. Boxes have 
 sizes, as in MJCF. A hull is the convex hull of spheres, a loft a surface over rings.
 """
 
+import hashlib
 import itertools
 import math
 from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, cast
 
-from pydantic import AfterValidator, Field, model_validator
+import numpy as np
+from pydantic import AfterValidator, Field, InstanceOf, model_validator
 
 from wbc_suite.config_files import FrozenModel
+from wbc_suite.typing import Indices, Matrix
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -59,6 +62,8 @@ Quaternion: TypeAlias = Annotated[
 
 Color: TypeAlias = str | tuple[float, float, float] | tuple[float, float, float, float]
 """A name in `[materials]`, or red green blue (alpha) from 0 to 1."""
+
+Rgba: TypeAlias = tuple[float, float, float, float]
 
 
 def quaternion_from_rpy(rpy: Vector3) -> tuple[float, float, float, float]:
@@ -222,18 +227,58 @@ class Loft(ShapeFields):
         return self
 
 
+class Surface:
+    """Triangles of one colour, in m; equal to others of the same content.
+
+    Attributes:
+        vertices: Their corners, shape (n, 3).
+        faces: Indices of three corners, shape (m, 3), counter-clockwise from outside.
+        color: Red green blue alpha from 0 to 1; None if none is stated.
+        digest: What tells their content from others.
+    """
+
+    def __init__(
+        self, vertices: Matrix, faces: Indices, color: Rgba | None = None
+    ) -> None:
+        self.vertices = np.ascontiguousarray(vertices, np.float32)
+        self.faces = np.ascontiguousarray(faces, np.int32)
+        self.color = color
+        content = hashlib.sha256(self.vertices.tobytes())
+        content.update(self.faces.tobytes())
+        content.update(repr(color).encode())
+        self.digest = content.hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Surface) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+
 class SkinMesh(ShapeFields):
-    """A mesh file (absolute path) that replaces a link's visual shapes."""
+    """A mesh that is drawn instead of a link's visual shapes.
+
+    Attributes:
+        file: The mesh file, or the model file with it, an absolute path.
+        scale: Factors of the file's axes.
+        surface: The triangles to draw; by default all those of the file.
+    """
 
     shape: Literal["skin"]
     file: str
     scale: Vector3 = (1.0, 1.0, 1.0)
+    surface: InstanceOf[Surface] | None = None
 
 
 Shape: TypeAlias = Annotated[
     Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | Loft,
     Field(discriminator="shape"),
 ]
+Drawn: TypeAlias = Annotated[
+    Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | Loft | SkinMesh,
+    Field(discriminator="shape"),
+]
+"""What a picture shows of a link."""
 
 
 def cached_by_shape(compute: Callable[[S], T]) -> Callable[[S], T]:

@@ -24,8 +24,8 @@ from wbc_suite.robot.shapes import Color, Posed, SkinMesh, Vector3
 
 log = logs.logger(__name__)
 
-MESHES = "meshes"
-"""Name of the skin from installed packages; any other skin is a folder."""
+MESHES, PLAIN = "meshes", "none"
+"""Skins from installed packages, and none; any other skin is a folder."""
 
 
 def _module(name: str) -> Iterator[Path]:

@@ -18,7 +18,7 @@ from wbc_suite.robot.adopt.importing import (
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
 from wbc_suite.robot.poses import pose_fields
-from wbc_suite.robot.shapes import SkinMesh
+from wbc_suite.robot.shapes import Drawn
 from wbc_suite.robot.urdf_elements import (
     Branch,
     number,
@@ -50,15 +50,15 @@ def read_urdf(
     *,
     mesh_root: Path | str | None = None,
     strict: bool = False,
-    skin: bool = False,
+    skin: bool = True,
 ) -> RobotDescription:
     """Read a URDF file.
 
     Links and joints keep names that are valid in our format (letters, digits, `_`,
     unique over links, joints and frames). The joint below a massless link `world`
     defines the root. Massless links without shapes at the ends become frames. Meshes
-    become convex hulls. Groups, end effectors and the posture `ready` are inferred;
-    `to_toml()` writes the result for editing.
+    are drawn, and collide as convex hulls. Groups, end effectors and the posture
+    `ready` are inferred; `to_toml()` writes the result for editing.
 
     Args:
         path: The file.
@@ -66,7 +66,7 @@ def read_urdf(
             by default the ROS package or model folder that encloses the file.
         strict: Refuse what is mended with a warning otherwise: inertias that no body
             can have, moving links without mass, faulty shapes.
-        skin: Draw links with their meshes instead of hulls; needs the extra `skins`.
+        skin: Draw links with their meshes, not with the hulls of these.
 
     Raises:
         ConfigError: If the file is not URDF.
@@ -139,10 +139,9 @@ class _Importer:
             strict=self._strict,
         )
 
-    def skins(self) -> dict[str, tuple[SkinMesh, ...]]:
-        """Return the meshes that draw each link, by its name."""
-        found = {self._links[name]: s for name, s in self._shapes.skins.items()}
-        return {name: tuple(meshes) for name, meshes in found.items()}
+    def skins(self) -> dict[str, tuple[Drawn, ...]]:
+        """Return what draws the links with meshes, by their names."""
+        return {self._links[name]: s for name, s in self._shapes.skins.items()}
 
     def _root(self) -> tuple[dict[str, Any], tuple[Branch, ...]]:
         """Return the fields of the root, and the branches without the world."""

@@ -6,19 +6,23 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from pydantic import TypeAdapter
 
 from wbc_suite import logs
-from wbc_suite.errors import DescriptionError, join_first
+from wbc_suite.errors import ConfigError, DescriptionError, join_first
 from wbc_suite.robot.adopt.importing import NameTable
 from wbc_suite.robot.mesh_files import MeshIndex, can_read, read_points
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
-from wbc_suite.robot.shapes import SkinMesh
+from wbc_suite.robot.shapes import Drawn
+from wbc_suite.robot.surfaces import surfaces_of_file
 from wbc_suite.robot.urdf_elements import numbers, place_of, pose_of
 from wbc_suite.robot.xml_files import MAX_ABOVE, Element
 from wbc_suite.typing import Vector
 
 LOG = logs.logger(__name__)
+
+_DRAWN: TypeAdapter[Drawn] = TypeAdapter(Drawn)
 
 MIN_SIZE = 2e-6  # smallest size of a shape in m; smaller ones are left out
 
@@ -40,6 +44,16 @@ class MeshFolder:
             if path is not None and can_read(path):
                 self._shapes[key] = fit_hull(read_points(path) * scale)
         return self._shapes[key]
+
+    def surfaces(self, filename: str, scale: Vector) -> list[dict[str, Any]]:
+        """Return the surfaces of a mesh, scaled (3,); raises ConfigError."""
+        path, factors = self.find(filename), tuple(scale.tolist())
+        if path is None:
+            return []
+        return [
+            {"shape": "skin", "file": str(path), "surface": own, "color": own.color}
+            for own in surfaces_of_file(path, factors, folder=self._root)
+        ]
 
     def find(self, filename: str) -> Path | None:
         """Return the file of a reference, if there is one in the folder."""
@@ -89,13 +103,13 @@ class UrdfShapes:
 
     Attributes:
         colors: Those of the materials, by valid name.
-        skins: Meshes of links that are drawn by meshes alone, by the name in the file.
+        skins: What draws the links that have readable meshes, by the name in the file.
     """
 
     def __init__(self, robot: Element, meshes: MeshFolder, *, strict: bool) -> None:
         self._meshes, self._strict = meshes, strict
         self._dropped: list[str] = []
-        self.skins: dict[str, list[SkinMesh]] = {}
+        self.skins: dict[str, tuple[Drawn, ...]] = {}
         self._materials: dict[str, str] = {}
         self.colors: dict[str, tuple[float, ...]] = {}
         names = NameTable()
@@ -109,11 +123,12 @@ class UrdfShapes:
 
     def of(self, link: Element) -> dict[str, list[dict[str, Any]]]:
         """Return a link's shapes; without readable visuals, collision is drawn."""
-        visual = [
-            shape | {"color": self._color(item)}
-            for item in link.findall("visual")
-            for shape in self._shapes(item, link)
-        ]
+        visual, drawn = list[dict[str, Any]](), list[dict[str, Any]]()
+        for item in link.findall("visual"):
+            color = self._color(item)
+            own = [shape | {"color": color} for shape in self._shapes(item, link)]
+            visual += own
+            drawn += (own and self._surfaces(item, link, color)) or own
         collision = [
             shape
             for item in link.findall("collision")
@@ -122,7 +137,8 @@ class UrdfShapes:
         first = link.find("visual")
         if not visual and first is not None:
             visual = [shape | {"color": self._color(first)} for shape in collision]
-        self._keep_skin(link)
+        if any(shape["shape"] == "skin" for shape in drawn):
+            self.skins[link.get("name", "")] = tuple(map(_DRAWN.validate_python, drawn))
         return {"visual": visual, "collision": collision}
 
     def report(self, path: Path) -> None:
@@ -131,23 +147,21 @@ class UrdfShapes:
         if self._dropped:
             LOG.warning("%s: shapes left out: %s.", path, "; ".join(self._dropped))
 
-    def _keep_skin(self, link: Element) -> None:
-        meshes: list[SkinMesh] = []
-        for item in link.findall("visual"):
-            form = item.find("geometry/mesh")
-            file = None if form is None else self._meshes.find(form.get("filename", ""))
-            if form is None or file is None:
-                return
-            where = place_of(link)
-            try:
-                scale = tuple(_scale(form, where).tolist())
-                pose = pose_fields(pose_of(item, where=where))
-            except DescriptionError:
-                return  # the shape is left out and reported
-            own = {"shape": "skin", "file": str(file), "color": self._color(item)}
-            meshes.append(SkinMesh.model_validate(own | {"scale": scale} | pose))
-        if meshes:
-            self.skins[link.get("name", "")] = meshes
+    def _surfaces(
+        self, item: Element, link: Element, color: str
+    ) -> list[dict[str, Any]]:
+        """Return the mesh of a visual as surfaces; its own colours come first."""
+        form = item.find("geometry/mesh")
+        if form is None:
+            return []
+        where = place_of(link)
+        try:
+            found = self._meshes.surfaces(form.get("filename", ""), _scale(form, where))
+        except ConfigError as error:
+            LOG.warning("%s: %s It is drawn as a hull.", where, error)
+            return []
+        pose = pose_fields(pose_of(item, where=where))
+        return [fields | {"color": fields["color"] or color} | pose for fields in found]
 
     def _color(self, visual: Element) -> str:
         """Return the name of a visual's material, grey if it has none."""
