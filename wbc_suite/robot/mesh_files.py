@@ -1,7 +1,7 @@
-"""Mesh files (STL, OBJ): write, read points, and read the meshes of skins."""
+"""Mesh files (STL, OBJ, glTF, COLLADA): write them, read points and skins."""
 
 import hashlib
-import importlib.util
+import importlib
 import io
 import os
 from contextlib import suppress
@@ -18,8 +18,7 @@ from wbc_suite.files import check_file, read_bytes
 from wbc_suite.robot.shapes import SkinMesh, Vector3, cached_by_shape
 from wbc_suite.typing import Indices, Matrix
 
-READABLE = (".stl", ".obj", ".glb")  # suffixes of the files that need no extra
-COLLADA = ".dae"
+READABLE = (".stl", ".obj", ".glb", ".dae")  # suffixes of files that are meshes
 MAX_BYTES = 100_000_000  # largest mesh file that is read
 MAX_FILES = 20_000  # of a folder that is searched for meshes
 
@@ -47,7 +46,7 @@ class MeshIndex:
     def _by_name(self) -> dict[str, list[Path]]:
         found: dict[str, list[Path]] = {}
         for path in islice(self._folder.rglob("*"), MAX_FILES):
-            if path.suffix.casefold() in (*READABLE, COLLADA):
+            if path.suffix.casefold() in READABLE:
                 found.setdefault(path.name.casefold(), []).append(path)
         return found
 
@@ -67,10 +66,8 @@ def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:
 
 
 def can_read(path: Path) -> bool:
-    """Whether `read_points` can read a file, by its suffix and the installed extra."""
-    suffix = path.suffix.lower()
-    collada = suffix == COLLADA and importlib.util.find_spec("collada") is not None
-    return suffix in READABLE or collada
+    """Whether `read_points` can read a file, by its suffix."""
+    return path.suffix.lower() in READABLE
 
 
 def read_points(path: Path) -> Matrix:
@@ -96,8 +93,6 @@ def _trimesh() -> Any:
 
 def _loaded(path: Path, data: bytes) -> Any:
     """Return trimesh's mesh of a file, or its points if it has no faces."""
-    if path.suffix.lower() == COLLADA:
-        _import_extra("collada")
     # by its content, since trimesh would open the files that a path's file names
     kind = path.suffix[1:].lower()
     with np.errstate(invalid="ignore"):  # of NaN, which is refused
