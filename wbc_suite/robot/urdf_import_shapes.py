@@ -77,9 +77,10 @@ class MeshFolder:
         name, rest = match[1], match[2]
         if name not in self._packages:
             self._packages[name] = package_folder(name, self._urdf)
-        folder = self._packages[name]
-        path = folder and (folder / rest).resolve()
-        inside = path and path.is_relative_to(folder.resolve()) and path.is_file()
+        if (folder := self._packages[name]) is None:
+            return None
+        path = (folder / rest).resolve()
+        inside = path.is_relative_to(folder.resolve()) and path.is_file()
         return path if inside else None
 
     def report(self) -> None:
