@@ -110,7 +110,7 @@ class Log(logging.Handler):
         if "is imported as" in record.msg and isinstance(record.args, tuple):
             kind, original, name = map(str, record.args)
             self.names.setdefault((kind, original), name)
-        elif "meshes found" in record.msg and isinstance(record.args, tuple):
+        elif "meshes read" in record.msg and isinstance(record.args, tuple):
             self.meshes = int(str(record.args[1]))
         elif record.levelno >= logging.WARNING:
             self.warnings.append(record.getMessage())
@@ -147,10 +147,13 @@ def compare_urdf(path: Path, theirs: Any, robot: RobotDescription, log: Log) -> 
         if ours.existJointName(log.named("joint", name))
         and theirs.joints[theirs.getJointId(name)].nv == 1
     }
+    held = held_joints(theirs)
     lost = [
         name
         for name in theirs.names[1:]
-        if name not in names and theirs.joints[theirs.getJointId(name)].nv == 1
+        if name not in names
+        and name not in held
+        and theirs.joints[theirs.getJointId(name)].nv == 1
     ]
     bodies = [f.name for f in theirs.frames if f.type == pin.FrameType.BODY]
     frames = {
@@ -166,6 +169,8 @@ def compare_urdf(path: Path, theirs: Any, robot: RobotDescription, log: Log) -> 
         for name, own in names.items():
             value = draw(robot, own, rng)
             place(ours, own, q_ours, value)
+            place(theirs, name, q_theirs, value)
+        for name, value in held.items():
             place(theirs, name, q_theirs, value)
         data_ours, data_theirs = ours.createData(), theirs.createData()
         pin.framesForwardKinematics(ours, data_ours, q_ours)
@@ -198,6 +203,17 @@ def compare_urdf(path: Path, theirs: Any, robot: RobotDescription, log: Log) -> 
         "limits": limits_differ(tree, robot, log),
         "mimics": mimics_lost(tree, robot, log),
     }
+
+
+def held_joints(model: Any) -> dict[str, float]:
+    """Return the joints whose range is one value other than 0, and the value."""
+    ends = (model.lowerPositionLimit, model.upperPositionLimit)
+    found: dict[str, float] = {}
+    for name, joint in zip(model.names, model.joints, strict=True):
+        low, high = (limit[joint.idx_q] for limit in ends) if joint.nq == 1 else (0, 1)
+        if low == high != 0.0:
+            found[name] = float(low)
+    return found
 
 
 def elements(path: Path) -> Element:
@@ -510,7 +526,7 @@ def summarise(report: Report) -> None:
     exist = sum(row.get("meshes_exist", 0) for row in loaded)
     found = sum(row.get("meshes_found", 0) for row in loaded)
     if exist:
-        report.ratios["meshes found"] = found / exist
+        report.ratios["meshes read"] = found / exist
     report.show_ratios()
 
 

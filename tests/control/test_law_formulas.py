@@ -272,6 +272,7 @@ def test_osc_adds_the_way_to_its_goal_to_what_its_posture_asks_for(monkeypatch):
         J=np.zeros((6, n)),
         C=np.eye(n),
         wanted=np.zeros(6),
+        pull=np.zeros(6),
         posture=np.arange(7.0),
         z=np.full(n, 2.0),
         L=np.eye(6),
@@ -280,7 +281,7 @@ def test_osc_adds_the_way_to_its_goal_to_what_its_posture_asks_for(monkeypatch):
         dofs=np.arange(n)[::-1],
     )
     physics = record(osc=work, acceleration=np.zeros(n))
-    plain(osc.osc_law)(physics, record(first=0, last=n), None)
+    plain(osc.osc_law)(physics, record(first=0, last=n, turn_weight=1.0), None)
     np.testing.assert_array_equal(physics.acceleration[::-1], np.arange(7.0) + 2.0)
 
 

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
@@ -446,6 +447,73 @@ def test_meshes_are_found_in_the_package_around_the_file(
     assert Path(skin.file) == tmp_path / mesh
 
 
+@pytest.mark.parametrize(
+    ("mesh", "variable", "value"),
+    [
+        ("src/hand/meshes/part.stl", None, None),
+        ("src/hand/visual/part.stl", None, None),
+        ("elsewhere/hand/visual/part.stl", "ROS_PACKAGE_PATH", "elsewhere"),
+        ("elsewhere/hand/visual/part.stl", "ROS_PACKAGE_PATH", "elsewhere/hand"),
+        ("elsewhere/repo/hand/visual/part.stl", "ROS_PACKAGE_PATH", "none:elsewhere"),
+        ("prefix/share/hand/visual/part.stl", "AMENT_PREFIX_PATH", "prefix"),
+    ],
+)
+def test_meshes_of_other_packages_are_found(
+    tmp_path, monkeypatch, mesh, variable, value
+):
+    own = tmp_path / "src" / "arm"
+    write_stl(own / "meshes" / "part.stl", 2.0 * tetrahedron()[0], tetrahedron()[1])
+    write_stl(tmp_path / mesh, *tetrahedron())
+    if "visual" in mesh and variable is None:
+        (tmp_path / "src" / "hand" / "package.xml").write_text("<package/>")
+    if variable is not None:
+        paths = ":".join(str(tmp_path / x) for x in value.split(":"))
+        monkeypatch.setenv(variable, paths)
+    (own / "urdf").mkdir()
+    part = "/".join(mesh.split("/")[-2:])
+    path = write(own / "urdf", mesh_robot(f"package://hand/{part}"))
+    vertices = support_points(read_urdf(path).links[0].visual[0])
+    np.testing.assert_allclose(vertices.max(0), 0.1, atol=1e-7)
+    own_only = support_points(read_urdf(path, mesh_root=own).links[0].visual[0])
+    np.testing.assert_allclose(own_only.max(0), 0.2, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["..", ".", "hand/../..", ".hand", "*"])
+def test_no_name_of_a_package_leads_out_of_packages(tmp_path, monkeypatch, name):
+    write_stl(tmp_path / "src" / "secret.stl", *tetrahedron())
+    write_stl(tmp_path / ".hand" / "meshes" / "secret.stl", *tetrahedron())
+    (tmp_path / "src" / "hand" / "meshes").mkdir(parents=True)
+    (tmp_path / "src" / "hand" / "link.stl").symlink_to(tmp_path / "src/secret.stl")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src"))
+    own = tmp_path / "src" / "arm" / "urdf"
+    own.mkdir(parents=True)
+    for file in ("secret.stl", "meshes/secret.stl", "link.stl"):
+        path = write(own, mesh_robot(f"package://{name}/{file}"))
+        assert read_urdf(path).links[0].visual == ()
+
+
+def test_meshes_that_cannot_be_read_do_not_count_as_read(tmp_path, caplog):
+    write_stl(tmp_path / "a.stl", *tetrahedron())
+    (tmp_path / "b.ply").write_text("ply")
+    text = mesh_robot("a.stl").replace("a.stl", "b.ply", 1)
+    with caplog.at_level(logging.INFO):
+        read_urdf(write(tmp_path, text))
+    assert "1 of 2 meshes read" in caplog.text
+    assert "1 of 2 meshes are not read: b.ply. Convert them to STL" in caplog.text
+
+
+def test_collada_is_read_in_its_unit(tmp_path):
+    mesh = trimesh.Trimesh(*tetrahedron(), process=False)
+    text = trimesh.exchange.dae.export_collada(mesh).decode()
+    assert "<asset>" in text
+    scaled = text.replace("<asset>", '<asset><unit name="cm" meter="0.01"/>')
+    scaled = re.sub(r'(meter="0.01"/>)(.*?)<unit[^>]*/>', r"\1\2", scaled, flags=re.S)
+    (tmp_path / "part.dae").write_text(scaled, encoding="utf-8")
+    robot = read_urdf(write(tmp_path, mesh_robot("part.dae", "1 1 1")))
+    vertices = support_points(robot.links[0].visual[0])
+    np.testing.assert_allclose(vertices.max(0), 0.01, atol=1e-7)
+
+
 def test_of_two_meshes_with_one_name_elsewhere_none_is_taken(tmp_path, caplog):
     for folder in ("a", "b"):
         write_stl(tmp_path / "meshes" / folder / "part.stl", *tetrahedron())
@@ -552,6 +620,7 @@ POINT = (
     '<inertial><mass value="1"/>'
     '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>'
 )
+STUCK = '<limit lower="0.5" upper="0.5" effort="5" velocity="1"/>'
 REVERSED = 'lower="2" upper="-1" effort="5" velocity="1"'
 MENDED = {
     "unphysical inertia": (
@@ -598,6 +667,15 @@ MENDED = {
         ),
         r"ranges .* reversed; mended: a from -1 to 2\.|range from 2.0 to -1.0 is rev",
     ),
+    "range of one value": (
+        one_arm(
+            TWO,
+            joint("a", "base", "l0", kind="revolute", inner=STUCK)
+            + joint("b", "l0", "l1"),
+        ),
+        r"(held fixed|cannot move).*joint 'a' \(line 1\) at 0.5|"
+        r"joint 'a' \(line 1\): it cannot move from 0.5 to 0.5",
+    ),
 }
 
 
@@ -610,6 +688,36 @@ def test_faults_are_mended_with_a_warning_or_refused(tmp_path, text, message, ca
     assert np.isfinite(model.dof_invweight0).all()
     with pytest.raises(DescriptionError, match=message):
         read_urdf(path, strict=True)
+
+
+def test_a_joint_of_one_value_is_fixed_there_with_its_followers(tmp_path):
+    """Pinocchio's reader moves these joints; there they are set to their values."""
+    tilt = '<origin xyz="0.1 0.2 0.3" rpy="0.4 -0.5 0.6"/><axis xyz="0.6 0 0.8"/>'
+    names = ("base", "l0", "l1", "l2", "l3")
+    slide = '<limit lower="-1" upper="1" effort="5" velocity="1"/>'
+    inner = {
+        "a": ("revolute", STUCK),
+        "b": ("prismatic", slide + '<mimic joint="a" multiplier="-2" offset="0.1"/>'),
+        "c": ("continuous", '<mimic joint="b"/>'),
+        "d": ("continuous", ""),
+    }
+    ends = dict(zip(inner, itertools.pairwise(names), strict=True))
+    joints = "".join(
+        joint(x, *ends[x], kind=kind, inner=tilt + text)
+        for x, (kind, text) in inner.items()
+    )
+    links = "".join(f'<link name="{name}">{BODY}</link>' for name in names[1:])
+    path = write(tmp_path, one_arm(links, joints))
+    robot = read_urdf(path)
+    assert robot.joint_names == ("d",)
+    theirs, ours = pin.buildModelFromUrdf(str(path)), robot.to_pinocchio()
+    held = {"a": 0.5, "b": -0.9, "c": -0.9}
+    places = []
+    for model, values in ((theirs, held | {"d": 0.7}), (ours, {"d": 0.7})):
+        data, q = model.createData(), positions(model, values)
+        pin.framesForwardKinematics(model, data, q)
+        places.append(data.oMf[model.getFrameId("l3")].homogeneous)
+    np.testing.assert_allclose(places[1], places[0], atol=TOLERANCE)
 
 
 def test_unphysical_inertias_are_mended(tmp_path):

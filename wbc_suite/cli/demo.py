@@ -79,17 +79,14 @@ def _sizes(
     robot: "RobotDescription", config: dict[str, Any]
 ) -> "Iterator[tuple[str, float]]":
     """Yield each frame that moves and the size of its figure, 1 for a long arm."""
-    import numpy as np
+    from wbc_suite.robot.arms import arm_length
 
     feet = any(frame.role == "foot" for frame in robot.frames)
     most = STANDING if feet and robot.root.kind == "free" else 1.0
     for frame in config["frame"]:
         if frame.get("kind", "pose") != "pose":
             continue
-        length, link = 0.0, robot.link(robot.link_of(frame["frame"]))
-        while link.parent is not None:
-            length += float(np.linalg.norm(link.pos))
-            link = robot.link(link.parent)
+        length = arm_length(robot, frame["frame"])
         yield frame["name"], min(most, length / ARM) if length else ON_FEET
 
 

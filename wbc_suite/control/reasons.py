@@ -9,8 +9,13 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from wbc_suite.qp import ActiveLimit, LimitKind
 from wbc_suite.qp.report import Reason as SolverReason
+from wbc_suite.typing import Matrix
+
+SINGULAR = 1e-3  # of the greatest mobility, and m or rad per rad; less counts as none
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +56,19 @@ class TorqueLimit:
 
 
 @dataclass(frozen=True, slots=True)
+class FreeAxes:
+    """An arm has too few joints to turn its hand about these axes of the hand.
+
+    They are `rx`, `ry`, `rz`, in the present posture.
+    """
+
+    axes: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"too few joints: {', '.join(self.axes)} of the hand are free"
+
+
+@dataclass(frozen=True, slots=True)
 class InMotion:
     """The frame is moving to its goal."""
 
@@ -67,8 +85,29 @@ class NoSolution:
 
 
 Reason: TypeAlias = (
-    SolverReason | Contact | TrackingError | TorqueLimit | InMotion | NoSolution
+    SolverReason
+    | Contact
+    | TrackingError
+    | TorqueLimit
+    | FreeAxes
+    | InMotion
+    | NoSolution
 )
+
+
+def free_axes(jacobian: Matrix) -> FreeAxes:
+    """Return about which axes a hand cannot be turned while its position is kept.
+
+    The Jacobian, shape (6, n), is in the axes of the hand. An axis is free if most of a
+    turn about it is none that the joints can make.
+    """
+    _, values, rows = np.linalg.svd(jacobian[:3])
+    kept = rows[int((values > SINGULAR * values[0]).sum()) :].T
+    turns, values, _ = np.linalg.svd(jacobian[3:] @ kept, full_matrices=False)
+    reached = turns[:, values > SINGULAR]
+    shares = (reached**2).sum(axis=1)
+    names = ("rx", "ry", "rz")
+    return FreeAxes(tuple(x for x, own in zip(names, shares, strict=True) if own < 0.5))
 
 
 def is_transient(reason: Reason) -> bool:

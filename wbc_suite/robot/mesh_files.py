@@ -1,6 +1,6 @@
 """Mesh files (STL, OBJ, COLLADA, glTF): find, read and write them."""
 
-import importlib.util
+import importlib
 import io
 from functools import cached_property
 from itertools import islice, takewhile
@@ -13,8 +13,7 @@ from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.files import read_bytes
 from wbc_suite.typing import Indices, Matrix
 
-READABLE = (".stl", ".obj", ".glb")  # suffixes of the files that need no extra
-COLLADA = ".dae"
+READABLE = (".stl", ".obj", ".glb", ".dae")  # suffixes of files that are meshes
 MAX_BYTES = 100_000_000  # largest mesh file that is read
 MAX_FILES = 20_000  # of a folder that is searched for meshes
 
@@ -36,7 +35,7 @@ class MeshIndex:
     def _by_name(self) -> dict[str, list[Path]]:
         found: dict[str, list[Path]] = {}
         for path in islice(self._folder.rglob("*"), MAX_FILES):
-            if path.suffix.casefold() in (*READABLE, COLLADA):
+            if path.suffix.casefold() in READABLE:
                 found.setdefault(path.name.casefold(), []).append(path)
         return found
 
@@ -64,10 +63,8 @@ def write_mesh(
 
 
 def can_read(path: Path) -> bool:
-    """Whether `read_points` can read a file, by its suffix and the installed extra."""
-    suffix = path.suffix.lower()
-    collada = suffix == COLLADA and importlib.util.find_spec("collada") is not None
-    return suffix in READABLE or collada
+    """Whether `read_points` can read a file, by its suffix."""
+    return path.suffix.lower() in READABLE
 
 
 def read_points(path: Path) -> Matrix:
@@ -99,8 +96,6 @@ def load_mesh(path: Path, data: bytes) -> Any:
 
 def load_scene(path: Path, data: bytes, **options: Any) -> Any:
     """Return trimesh's scene of a file; raises anything for a malformed one."""
-    if path.suffix.lower() == COLLADA:
-        _import_extra("collada")
     # by its content, since trimesh would open the files that a path's file names
     kind = path.suffix[1:].lower()
     with np.errstate(invalid="ignore"):  # of NaN, which is refused
@@ -113,14 +108,3 @@ def unit_of(mesh: Any) -> float:
     """Return the length in m of the unit of trimesh's mesh."""
     factor, times, _ = str(mesh.units).partition(" * ")  # "0.0254 * meters"
     return float(factor) if times else 1.0
-
-
-def _import_extra(name: str) -> Any:
-    """Import a module of the extra `skins`; these modules have no types."""
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        raise ConfigError(
-            f"Meshes need the package of '{name}', which is not installed. "
-            "Install it with: pip install 'wbc-suite[skins]'"
-        ) from None

@@ -1,5 +1,6 @@
 """Read a URDF file into a robot description."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from wbc_suite.robot.urdf_elements import (
 )
 from wbc_suite.robot.urdf_export import ROOT_TYPES, UNLIMITED
 from wbc_suite.robot.urdf_import_shapes import MeshFolder, UrdfShapes
-from wbc_suite.robot.xml_files import Element, at_line, model_root
+from wbc_suite.robot.xml_files import Element, at_line
 
 LOG = logs.logger(__name__)
 
@@ -62,8 +63,9 @@ def read_urdf(
 
     Args:
         path: The file.
-        mesh_root: Folder that meshes are read from, and that `package://` refers to;
-            by default the ROS package or model folder that encloses the file.
+        mesh_root: Folder that meshes are read from, and that `package://` refers to.
+            By default the ROS package or model folder that encloses the file, and for
+            `package://` also packages beside these and those that ROS finds.
         strict: Refuse what is mended with a warning otherwise: inertias that no body
             can have, moving links without mass, faulty shapes.
         skin: Draw links with their meshes, not with the hulls of these.
@@ -75,7 +77,7 @@ def read_urdf(
     path = Path(path)
     element, branches = read_tree(path)
     names = (mesh.get("filename", "") for mesh in element.iter("mesh"))
-    meshes = MeshFolder(path, mesh_root or model_root(path, names))
+    meshes = MeshFolder(path, mesh_root, names)
     try:
         shapes = UrdfShapes(element, meshes, strict=strict)
         importer = _Importer(branches, shapes, strict=strict)
@@ -115,6 +117,7 @@ class _Importer:
         self.rooted = False
 
     def robot(self, name: str, path: Path) -> RobotDescription:
+        _hold_stuck(self._branches, path, strict=self._strict)
         root, branches = self._root()
         frames = _frame_names(branches)
         kept = [branch for branch in branches if branch.name not in frames]
@@ -207,13 +210,9 @@ class _Importer:
         if dynamics is not None:
             for ours, key in (("damping", "damping"), ("frictionloss", "friction")):
                 fields[ours] = number(dynamics, key, where=where, default=0.0)
-        mimic = joint.find("mimic")
-        if mimic is not None and (leader := self._leader(mimic, where)):
-            fields["mimic"] = {
-                "joint": leader,
-                "ratio": number(mimic, "multiplier", where=where, default=1.0),
-                "offset": number(mimic, "offset", where=where, default=0.0),
-            }
+        for name, ratio, offset in _mimics(joint, where):
+            if leader := self._leader(name, where):
+                fields["mimic"] = {"joint": leader, "ratio": ratio, "offset": offset}
         return fields
 
     def _range(
@@ -223,17 +222,8 @@ class _Importer:
 
         One that is missing, empty at zero or huge means an endless joint.
         """
-        limit = joint.find("limit")
-        low, high = (
-            0.0 if limit is None else number(limit, key, where=where, default=0.0)
-            for key in ("lower", "upper")
-        )
+        low, high = _ends(joint, where)
         name = self._joints[joint.get("name", "")]
-        if low == high != 0.0:
-            raise DescriptionError(
-                f"{where}: it cannot move from {low} to {high}. Correct 'lower' and "
-                "'upper', or make it fixed, or continuous if it is unlimited."
-            )
         if low > high and self._strict:
             raise DescriptionError(
                 f"{where}: its range from {low} to {high} is reversed. Swap 'lower' "
@@ -251,9 +241,8 @@ class _Importer:
             self._ranges.setdefault(note, []).append(shown)
         return None if endless or kind == "continuous" else (low, high)
 
-    def _leader(self, mimic: Element, where: str) -> str | None:
+    def _leader(self, name: str, where: str) -> str | None:
         """Return the joint that another follows; None if it does not move."""
-        name = mimic.get("joint", "")
         if name not in self._joints:
             fault = f"{where} follows '{name}', which is no moving joint"
             if self._strict:
@@ -275,6 +264,60 @@ class _Importer:
                 pose = pose_fields(poses[branch.name][1])
                 found.append({"name": name, "link": link, **pose})
         return found
+
+
+def _hold_stuck(branches: tuple[Branch, ...], path: Path, *, strict: bool) -> None:
+    """Fix joints whose range is one value other than 0 there, and their followers."""
+    moving = {
+        b.joint.get("name", ""): (b, b.joint)
+        for b in branches
+        if b.joint is not None and b.kind in JOINT_TYPES
+    }
+    held: dict[str, float] = {}
+    for name, (branch, joint) in moving.items():
+        low, high = _ends(joint, branch.where)
+        if low == high != 0.0 and branch.kind != "continuous":
+            held[name] = low
+            if strict:
+                raise DescriptionError(
+                    f"{branch.where}: it cannot move from {low:g} to {high:g}. Correct "
+                    "'lower' and 'upper', or make it fixed, or continuous if it is "
+                    "unlimited."
+                )
+    following = held
+    while following:
+        following = {
+            name: scale * held[leader] + offset
+            for name, (branch, joint) in moving.items()
+            for leader, scale, offset in _mimics(joint, branch.where)
+            if leader in held and name not in held
+        }
+        held |= following
+    for name, value in held.items():
+        _fix(*moving[name], value)
+    if held:
+        shown = [
+            f"{moving[name][0].where} at {value:g}" for name, value in held.items()
+        ]
+        LOG.warning(
+            "%s: held fixed, since 'lower' equals 'upper', or as followers of such a "
+            "joint; correct the range if it should move: %s.",
+            *(path, join_first(shown, limit=12)),
+        )
+
+
+def _fix(branch: Branch, joint: Element, value: float) -> None:
+    """Make a joint fixed at a value, rad or m."""
+    axis = value * np.asarray(_axis(joint, branch.where))
+    turns = JOINT_TYPES[branch.kind] == "hinge"
+    motion = pin.SE3(pin.exp3(axis), np.zeros(3)) if turns else pin.SE3(np.eye(3), axis)
+    pose = branch.pose * motion
+    for origin in joint.findall("origin"):
+        joint.remove(origin)
+    places = {"xyz": pose.translation, "rpy": pin.rpy.matrixToRpy(pose.rotation)}
+    texts = {key: " ".join(map(repr, x.tolist())) for key, x in places.items()}
+    joint.append(Element("origin", texts))
+    joint.set("type", "fixed")
 
 
 def _is_bare(branch: Branch) -> bool:
@@ -299,6 +342,26 @@ def _frame_names(branches: tuple[Branch, ...]) -> set[str]:
         if leaf and branch.kind == "fixed" and _is_bare(branch):
             frames.add(branch.name)
     return frames
+
+
+def _ends(joint: Element, where: str) -> tuple[float, float]:
+    """Read 'lower' and 'upper', 0 by default as in URDF."""
+    limit = joint.find("limit")
+    if limit is None:
+        return 0.0, 0.0
+    low, high = (
+        number(limit, key, where=where, default=0.0) for key in ("lower", "upper")
+    )
+    return low, high
+
+
+def _mimics(joint: Element, where: str) -> Iterator[tuple[str, float, float]]:
+    """Yield name, multiplier and offset of the joint that one follows, if any."""
+    mimic = joint.find("mimic")
+    if mimic is not None:
+        ratio = number(mimic, "multiplier", where=where, default=1.0)
+        offset = number(mimic, "offset", where=where, default=0.0)
+        yield mimic.get("joint", ""), ratio, offset
 
 
 def _axis(joint: Element, where: str) -> list[float]:

@@ -1,6 +1,6 @@
 """Read the shapes, meshes and colours of a URDF file."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,13 @@ from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.robot.shapes import Drawn
 from wbc_suite.robot.surfaces import surfaces_of_file
 from wbc_suite.robot.urdf_elements import numbers, place_of, pose_of
-from wbc_suite.robot.xml_files import MAX_ABOVE, Element
+from wbc_suite.robot.xml_files import (
+    MAX_ABOVE,
+    PACKAGE,
+    Element,
+    model_root,
+    package_folder,
+)
 from wbc_suite.typing import Vector
 
 LOG = logs.logger(__name__)
@@ -28,10 +34,14 @@ MIN_SIZE = 2e-6  # smallest size of a shape in m; smaller ones are left out
 
 
 class MeshFolder:
-    """Finds mesh files in one folder, and never outside it."""
+    """Finds mesh files in one folder, and in other ROS packages if `root` is None."""
 
-    def __init__(self, urdf: Path, root: Path | str) -> None:
-        self._urdf, self._root = urdf, Path(root).resolve()
+    def __init__(
+        self, urdf: Path, root: Path | str | None, references: Iterable[str] = ()
+    ) -> None:
+        self._urdf, self._is_given = urdf, root is not None
+        self._root = Path(root or model_root(urdf, references)).resolve()
+        self._packages: dict[str, Path | None] = {}
         self._index = MeshIndex(self._root)
         self._shapes: dict[tuple[str | float, ...], dict[str, Any] | None] = {}
 
@@ -56,7 +66,9 @@ class MeshFolder:
         ]
 
     def find(self, filename: str) -> Path | None:
-        """Return the file of a reference, if there is one in the folder."""
+        """Return the file of a reference, if there is one in the folder or package."""
+        if path := self._packaged(filename):
+            return path
         scheme, separator, rest = filename.partition("://")
         folder = self._urdf.resolve().parent
         candidates = [folder / (rest or filename)]
@@ -72,6 +84,19 @@ class MeshFolder:
         path = self._index.find(Path(rest or filename))
         return path if path and path.resolve().is_relative_to(self._root) else None
 
+    def _packaged(self, filename: str) -> Path | None:
+        """Return the file of `package://NAME/...` in the package NAME, if there."""
+        if self._is_given or not (match := PACKAGE.match(filename)):
+            return None
+        name, rest = match[1], match[2]
+        if name not in self._packages:
+            self._packages[name] = package_folder(name, self._urdf)
+        if (folder := self._packages[name]) is None:
+            return None
+        path = (folder / rest).resolve()
+        inside = path.is_relative_to(folder.resolve()) and path.is_file()
+        return path if inside else None
+
     def report(self) -> None:
         """Log one line with the number of meshes, and a warning about absent ones."""
         files = {
@@ -81,20 +106,22 @@ class MeshFolder:
         unread = sorted(
             name for name, path in files.items() if path and not can_read(path)
         )
-        found = len(files) - len(missing)
-        LOG.info("%s: %d of %d meshes found.", self._urdf, found, len(files))
+        read = len(files) - len(missing) - len(unread)
+        LOG.info("%s: %d of %d meshes read.", self._urdf, read, len(files))
         if missing:
             counts, shown = (len(missing), len(files)), join_first(missing)
+            ros = any(map(PACKAGE.match, missing)) and not self._is_given
             LOG.warning(
                 "%s: %d of %d meshes are not in %s: %s. Give another folder by "
-                "--mesh-root.",
+                "--mesh-root%s.",
                 *(self._urdf, *counts, self._root, shown),
+                ", or that of the package by ROS_PACKAGE_PATH" * ros,
             )
         if unread:
             LOG.warning(
-                "%s: left out %d meshes that are not STL, OBJ or GLB (to read them: "
-                "pip install 'wbc-suite[skins]'): %s.",
-                *(self._urdf, len(unread), join_first(unread)),
+                "%s: %d of %d meshes are not read: %s. Convert them to STL, OBJ, "
+                "GLB or COLLADA (.dae).",
+                *(self._urdf, len(unread), len(files), join_first(unread)),
             )
 
 

@@ -21,7 +21,8 @@ ROBOT_FOLDERS = ("urdf", "urdfs", "robots", "mjcf", "xml")
 COLLECTIONS = (*ROBOT_FOLDERS, "descriptions", "models")
 MESH_FOLDERS = ("meshes", "mesh", "assets")
 MAX_ABOVE = 6  # folders above a file that are looked at
-PACKAGE = re.compile(r"^(?:package|model):///?([^/]+)/.*$", re.DOTALL)
+PACKAGE = re.compile(r"^(?:package|model):///?([^/]+)/(.*)$", re.DOTALL)
+"""A reference into a ROS package: its name, and the path in it."""
 
 Element: TypeAlias = ElementTree.Element
 
@@ -159,6 +160,37 @@ def model_root(file: Path, references: Iterable[str]) -> Path:
     packages = {PACKAGE.sub(r"\1", name) for name in references if PACKAGE.match(name)}
     named = (p for p in above[:MAX_ABOVE] if p.name in packages)
     return next((p for p in named if root.is_relative_to(p)), root)
+
+
+def package_folder(name: str, file: Path) -> Path | None:
+    """Return the folder of a ROS package: around or beside a file, or where ROS looks.
+
+    ROS 1 looks in the folders of `ROS_PACKAGE_PATH` and in those inside them, ROS 2 in
+    `share` of each prefix of `AMENT_PREFIX_PATH`. One beside the file, or beside one of
+    the folders around it, has a `package.xml` or a folder of meshes.
+    """
+    if not re.fullmatch(r"\w[\w.-]*", name):
+        return None
+    above = real_path(file).parents[:MAX_ABOVE]
+    folders = [folder for folder in above if folder.name == name]
+    folders += [beside for folder in above if is_package(beside := folder / name)]
+    folders += [prefix / "share" / name for prefix in _paths_in("AMENT_PREFIX_PATH")]
+    for path in _paths_in("ROS_PACKAGE_PATH"):
+        folders += (
+            [path] if path.name == name else [path / name, *path.glob(f"*/{name}")]
+        )
+    return next((folder for folder in folders if folder.is_dir()), None)
+
+
+def is_package(folder: Path) -> bool:
+    """Whether a folder has a `package.xml`, or a folder of meshes."""
+    meshes = any((folder / name).is_dir() for name in MESH_FOLDERS)
+    return meshes or (folder / "package.xml").is_file()
+
+
+def _paths_in(variable: str) -> list[Path]:
+    """Return the folders that an environment variable lists."""
+    return [Path(x) for x in os.environ.get(variable, "").split(os.pathsep) if x]
 
 
 def real_path(path: Path) -> Path:

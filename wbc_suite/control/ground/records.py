@@ -63,6 +63,8 @@ class LawRecord(Record):
     """1/s."""
     speed: Annotated[Vector, 2]
     """Velocity limits, m/s and rad/s."""
+    turn_weight: float
+    """Of angular accelerations, beside 1 of linear ones where joints lack for both."""
     keep_direction: float
     """1: saturated joints keep the hand's direction."""
     parameters: Annotated[Vector, 32]

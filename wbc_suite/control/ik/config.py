@@ -22,6 +22,7 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.qp import LIMITS, TASKS
 from wbc_suite.registry import Registry
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.arms import FEW_JOINTS, has_few_joints
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.mjcf_export import STOP_MARGIN
 from wbc_suite.robot.shapes import Interval
@@ -39,7 +40,6 @@ __all__ = [
     "read_whole_body",
 ]
 
-FEW_JOINTS = 0.02  # [cost]/rad of a hand that less than six joints move
 CLOSE_FIT = 0.0025  # m; small arms have links 5 mm apart wherever they are
 
 
@@ -179,8 +179,6 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     for side, frame in robot.hands.items():
         name = _hand_name(side, len(robot.hands))
         frames.append({"name": name, "frame": frame, "kind": "pose"})
-        if robot.root.kind == "fixed" and _joints_to(robot, frame) < 6:
-            frames[-1]["orientation_cost"] = FEW_JOINTS
     if robot.root.kind == "planar":
         frames.append(_gliding_base(robot))
     frames = frames or [{"name": name, "frame": name} for name in [_foremost(robot)]]
@@ -199,15 +197,6 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     if "ready" in robot.keyframes:
         config["posture"] = {"keyframe": "ready"}
     return config
-
-
-def _joints_to(robot: RobotDescription, frame: str) -> int:
-    """Return how many joints move a frame."""
-    count, link = 0, robot.link(robot.link_of(frame))
-    while link.parent is not None:
-        count += link.joint is not None and link.joint.independent
-        link = robot.link(link.parent)
-    return count
 
 
 def _hand_name(side: str, count: int) -> str:
@@ -248,16 +237,38 @@ def _foremost(robot: RobotDescription) -> str:
     return next((frames[r] for r in ("torso", "base", "head") if r in frames), last)
 
 
+def position_first(
+    config: Mapping[str, Any], robot: RobotDescription
+) -> Mapping[str, Any]:
+    """Return a config in which hands whose arms have few joints turn as far as they go.
+
+    Those of its frames that state no cost of orientation get a small one, so that
+    orientation is not bought with position.
+    """
+    frames = config.get("frame")
+    if not isinstance(frames, list | tuple):
+        return config  # which is refused when it is read
+    few = {x for x in robot.hands.values() if has_few_joints(robot, x)}
+    least = {"orientation_cost": FEW_JOINTS}
+    known = [
+        {**least, **x} if isinstance(x, Mapping) and x.get("frame") in few else x
+        for x in frames
+    ]
+    return {**config, "frame": known}
+
+
 def read_whole_body(
     config: Mapping[str, Any], robot: RobotDescription | None, source: str
 ) -> WholeBodyIKConfig:
-    """Return the config as a model.
+    """Return the config as a model; hands of few joints are `position_first`.
 
     Raises:
         ConfigError: If it breaks a rule of the format, or names what the robot, if one
             is given, does not have. It names the source, the key, the value and the
             nearest name.
     """
+    if robot is not None:
+        config = position_first(config, robot)
     read = parse_model(WholeBodyIKConfig, config, source=source)
     if robot is not None:
         check_names(_names(read, robot), robot, source)

@@ -19,11 +19,12 @@ from wbc_suite.control.reasons import (
     Reason,
     TorqueLimit,
     TrackingError,
+    free_axes,
 )
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.qp import ActiveLimit, Conflict, OutOfReach
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
 COMMAND_STANDSTILL = 1e-3
 """rad/s or m/s; a command slower than that stands."""
@@ -53,6 +54,7 @@ class IkReport:
     """Compares poses with goals, and finds the reasons of remaining errors.
 
     The configuration is for the report's own use. Contacts of feet hold nothing back.
+    `few` has the hands whose arms have few joints.
     """
 
     def __init__(
@@ -60,10 +62,12 @@ class IkReport:
         config: WholeBodyIKConfig,
         configuration: Configuration,
         conversion: Conversion,
+        *,
         feet: Collection[str],
+        few: Collection[str],
     ) -> None:
         self._config, self._configuration = config, configuration
-        self._conversion, self._feet = conversion, feet
+        self._conversion, self._feet, self._few = conversion, feet, few
         self._frames = ControlledFrames(config, configuration)
         self._support = [self._joints_of(frame.frame) for frame in config.frames]
 
@@ -82,7 +86,15 @@ class IkReport:
         errors, reached = self._compare(q, goals)
         reasons: Callable[[], Reasons] = tuple
         if not all(reached):
-            reasons = cache(self._reasons(state, reached, answer, commanded))
+            turning = {
+                k: self._configuration.frame_jacobian(str(frame.frame))
+                for k, frame in enumerate(self._config.frames)
+                if frame.frame in self._few
+                and errors[k][0] <= self._config.tolerance[0]
+            }
+            reasons = cache(
+                self._reasons(state, reached, answer, commanded, turning=turning)
+            )
         return {
             frame.name: {
                 "reached": is_reached,
@@ -112,8 +124,12 @@ class IkReport:
         reached: Sequence[bool],
         answer: IkStep,
         commanded: Commanded,
+        *,
+        turning: Mapping[int, Matrix],
     ) -> Callable[[], Reasons]:
         """Return a function that finds each frame's reasons, now or later.
+
+        `turning` has the Jacobians of hands in place whose arms have few joints.
 
         Where the commanded robot is at its goal, the reason is why the body is not;
         else it is the solver's, or the limits where the solver has none.
@@ -135,7 +151,9 @@ class IkReport:
                     why = solver[frame.name]
                 else:
                     why = self._from_limits(k, reached, answer)
-                if not why and standing and not arrived[k]:
+                if k in turning:
+                    why = [free_axes(turning[k]), *why]
+                elif not why and standing and not arrived[k]:
                     why = [OutOfReach()]
                 found.append(why or [InMotion()])
             return found

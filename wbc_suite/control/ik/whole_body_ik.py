@@ -44,6 +44,7 @@ from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.planning import SceneCollisionChecker
 from wbc_suite.qp import ObstacleLimit
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.arms import has_few_joints
 from wbc_suite.typing import Vector
 
 LOG = logs.logger(__name__)
@@ -115,8 +116,13 @@ class WholeBodyIK:
         self._make_laws(state, float(limits.max()))
         self._state = TickState.zeros()
         feet = {self.robot.link_of(held.frame) for held in self.config.held}
+        robot = state.robot
         self._report = IkReport(
-            self.config, Configuration(model), self._conversion, feet
+            self.config,
+            Configuration(model),
+            self._conversion,
+            feet=feet,
+            few={x for x in robot.hands.values() if has_few_joints(robot, x)},
         )
         self.reset(state)
 

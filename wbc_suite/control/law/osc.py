@@ -29,6 +29,7 @@ from wbc_suite.linear_algebra import (
     solve_upper,
 )
 from wbc_suite.qp.lie import exp3, log3, saturate
+from wbc_suite.robot.arms import FEW_JOINTS, has_few_joints
 from wbc_suite.typing import Matrix, Vector
 
 SINGULAR = 1e-4
@@ -67,6 +68,8 @@ class OscLaw(Law):
         super().__init__(LawKind.OSC, state, joints)
         self.record["site"] = state.model.site(state.prefix + site).id
         self.record["speed"] = np.inf
+        few = has_few_joints(state.robot, site)
+        self.record["turn_weight"] = FEW_JOINTS if few else 1.0
 
     @property
     def gains(self) -> Parts:
@@ -122,11 +125,17 @@ def osc_law(physics: Physics, law: LawRecord, drives: Drives) -> None:
         Y z = x'' - J' v - J a0,    Y = J C^-T,    Y Y^T = J M^-1 J^T,
 
     found by an LQ factorisation of Y: as exact as Y itself, where the mobility `Y Y^T`
-    of a stretched arm has lost half of the digits.
+    of a stretched arm has lost half of the digits. An arm of few joints cannot do both
+    halves: its angular rows have a small weight.
     """
     n, work = law.last - law.first, physics.osc
     J, C, wanted, posture, z = work.J, work.C, work.wanted, work.posture, work.z
     write_hand_task(physics, law, drives)
+    for i in range(3, 6):
+        wanted[i] *= law.turn_weight
+        work.pull[i] *= law.turn_weight
+        for j in range(n):
+            J[i, j] *= law.turn_weight
     for i in range(6):
         for j in range(n):
             wanted[i] -= J[i, j] * posture[j]

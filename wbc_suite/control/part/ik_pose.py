@@ -41,6 +41,7 @@ from wbc_suite.qp import (
     VelocityLimit,
 )
 from wbc_suite.qp.tick import TickStatus
+from wbc_suite.robot.arms import FEW_JOINTS, has_few_joints
 from wbc_suite.typing import Vector
 
 AXES = (Axis.X, Axis.Y, Axis.Z, Axis.QX, Axis.QY, Axis.QZ, Axis.QW)
@@ -119,6 +120,7 @@ class IkPoseController(PartController[JointLaw]):
     ) -> None:
         assert part.hand is not None
         self.config, self._state, self._hand = config, state, part.hand
+        self._has_few = has_few_joints(state.robot, part.hand)
         site = state.model.site(state.prefix + part.hand).id
         kd = damping_of(config.kp, config.damping_ratio)
         self.law = JointLaw(state, part.joints, kp=config.kp, kd=kd)
@@ -164,6 +166,7 @@ class IkPoseController(PartController[JointLaw]):
         own = {joint: feasible[joint] for joint in joints}
         hand = FrameTask(
             self._hand,
+            orientation_cost=FEW_JOINTS if self._has_few else 1.0,
             gain=motion.gain,
             max_linear_speed=UNLIMITED,
             max_angular_speed=UNLIMITED,

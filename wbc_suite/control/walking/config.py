@@ -18,12 +18,14 @@ from wbc_suite.control.ik.config import (
     InputFrame,
     check_names,
     default_whole_body_config,
+    position_first,
 )
 from wbc_suite.control.ik.frame_kinds import ControlledFrame, GoalsConfig
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.locomotion import GAITS, GaitConfig, TrotConfig
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.adopt.soles import ball_radius, guess_sole
+from wbc_suite.robot.arms import has_few_joints
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.shapes import Interval
 
@@ -156,8 +158,11 @@ def default_dynamics_config(robot: RobotDescription) -> dict[str, Any]:
         if x["frame"] in robot.hands.values()
     ]
     if robot.root.kind != "free":
-        weights = {"position_cost": 6.0, "orientation_cost": 2.0}  # as SpotWithArm's
-        return {"format": 1, "frame": [hand | weights for hand in hands]}
+        for hand in hands:
+            hand["position_cost"] = 6.0  # as SpotWithArm's
+            if not has_few_joints(robot, hand["frame"]):
+                hand["orientation_cost"] = 2.0
+        return {"format": 1, "frame": hands}
     feet = [frame.name for frame in robot.frames if frame.role == "foot"]
     if len(feet) < 2:
         raise ConfigError(
@@ -219,6 +224,8 @@ def read_dynamics(
         ConfigError: If it breaks a rule of the format, names what the robot, if one
             is given, does not have, or has feet where the root is not free.
     """
+    if robot is not None:
+        config = position_first(config, robot)
     read = _parse(config, source)
     if robot is not None:
         _check_root(read, robot, source)
