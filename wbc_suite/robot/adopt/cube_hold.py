@@ -24,7 +24,8 @@ CLOSING, SHAKING = 0.5, 0.15
 """Time to close, and of each of six pushes, s."""
 SHAKE = 15.0  # m/s^2; gravity and 5 m/s^2
 YIELDING = (0.1, 0.01)  # error at which a motor has its full effort, rad and m
-FAR = 0.03  # m; a cube that has moved farther from the grasp is lost
+FAR, SLIP = 0.05, 0.02
+"""Greatest way of a held cube from the grasp, and of that the part when shaken, m."""
 EFFORT = 1.0  # N m or N, of a joint that has none
 
 
@@ -36,7 +37,11 @@ def hand_alone(
     Links without collision shapes collide with their visual ones.
     """
     rigid = rigid_bodies(robot.links)
-    kept = [x for x in robot.links if rigid[x.name] in {palm, *moving}]
+    below = {palm}
+    for link in robot.links:
+        if link.name in moving and rigid[str(link.parent)] in below:
+            below.add(link.name)
+    kept = [link for link in robot.links if rigid[link.name] in below]
     names = {link.name for link in kept}
     joints = {x.joint.name for x in kept if x.joint and x.name != palm}
 
@@ -72,6 +77,8 @@ def holds_cube(hand: RobotDescription, synergy: Synergy, tcp: Frame | None) -> b
     model = _scene(hand, synergy, tcp)
     data = mujoco.MjData(model)
     for joint, value in hand.posture(synergy.open).items():
+        if joint not in hand.joint_names:  # of the wrist
+            continue
         data.joint(joint).qpos[0] = value
     mujoco.mj_kinematics(model, data)
     cube = model.joint("cube").qposadr[0]
@@ -80,10 +87,14 @@ def holds_cube(hand: RobotDescription, synergy: Synergy, tcp: Frame | None) -> b
     mujoco.mju_mat2Quat(data.qpos[cube + 3 : cube + 7], data.site("grasp").xmat)
     data.ctrl[:] = [synergy.closed[model.actuator(k).name] for k in range(model.nu)]
     _run(model, data, CLOSING, np.zeros(3))
+    gripped = data.qpos[cube : cube + 3].copy()
     for push in (*np.eye(3), *-np.eye(3)):
         _run(model, data, SHAKING, SHAKE * push)
-    moved = float(np.linalg.norm(data.qpos[cube : cube + 3] - begin))
-    return moved < FAR and bool(data.ncon) and not data.warning.number.any()
+    moved, slip = (
+        float(np.linalg.norm(data.qpos[cube : cube + 3] - x)) for x in (begin, gripped)
+    )
+    held = moved < FAR and slip < SLIP and data.ncon > 0
+    return held and not data.warning.number.any()
 
 
 def _run(

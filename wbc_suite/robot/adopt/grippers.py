@@ -12,15 +12,14 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.robot.adopt.cube_hold import CUBE, hand_alone, holds_cube
+from wbc_suite.robot.adopt.jaws import OPENING, TURNS, jaw_tip, points_on
 from wbc_suite.robot.adopt.posed_robot import PosedRobot
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame, Joint, Link, Synergy, rigid_bodies
 from wbc_suite.robot.poses import pose_fields
-from wbc_suite.robot.surface_points import surface_points
 from wbc_suite.typing import Matrix, Vector
 
 APART = 1e-3  # m; a motion that changes the distance of fingers less neither closes
-TIP = 0.01  # m; points of a finger that are so near to its farthest one are its tip
 INSETS = (0.01, 0.025, 0.04)
 """Distances of a grasp from the tips, m; Franka's is 9 mm behind them."""
 PARALLEL = 0.7  # least cosine between axes that bend a finger the same way
@@ -50,8 +49,9 @@ def infer_grippers(robot: RobotDescription) -> dict[str, Gripper]:
     The outermost links of the hand are its fingers; a single one closes on the palm.
     Joints parallel to a finger's last one bend it. Those of all fingers take the ends
     of their ranges that bring the tips closest to each other and to their bases. Other
-    joints of a thumb take the value that brings it closest to the fingers, those of
-    other fingers stay at zero. A hand of three fingers or more opens to zero.
+    joints of a thumb, which alone is parallel to no finger, take the value that brings
+    it closest to the fingers; those of other fingers stay at zero. A hand
+    of three fingers or more opens to zero.
 
     The grasp lies between the tips where they are as far apart as a cube of 4 cm. The
     first proposal that holds this cube is taken: closed fully or only until the tips
@@ -120,6 +120,11 @@ class _Hand:
             for joint in alone.joints
         }
         self.fingers = self._fingers()
+        leaders = {self._leaders[j.name] for f in self.fingers for j in f.joints}
+        found = [joint for joint in alone.joints if joint.name in leaders]
+        self.ranges = {joint.name: joint.range for joint in found if joint.range}
+        if len(found) == 1 and not self.ranges and len(self.fingers) == 1:
+            self.ranges = {found[0].name: self._jaw_range(found[0])}
 
     @classmethod
     def of(cls, robot: RobotDescription, group: str) -> "_Hand | None":
@@ -138,37 +143,35 @@ class _Hand:
         while len(tops) == 1 and (below := [n for n in own if moving[n] == tops[0]]):
             joint = robot.link(tops[0]).joint
             if joint is not None and joint.mimic is None:
-                constant[joint.name] = _zero(joint)
+                constant[joint.name] = _zero(joint.range or (0.0, 0.0))
             tops = below
         palm = moving[tops[0]] if tops else ""
         tops = [name for name in tops if moving[name] == palm]
         if not tops:
             return None
         hand = cls(hand_alone(robot, palm, own), constant)
-        return hand if hand.fingers and hand.movable else None
+        return hand if hand.fingers and hand.ranges else None
 
-    @property
-    def movable(self) -> list[Joint]:
-        """Joints with limits that follow no other, of fingers."""
-        leaders = {self._leaders[j.name] for f in self.fingers for j in f.joints}
-        return [j for j in self.alone.joints if j.name in leaders and j.range]
-
-    def _points(self, name: str) -> Matrix:
-        """Return points on a link and those fixed to it, shape (n, 3), in its frame."""
-        rigid = rigid_bodies(self.alone.links)
-        pose = self._posed.pose(name)
-        parts = [np.empty((0, 3))]
-        for link in self.alone.links:
-            if rigid[link.name] == name and (link.collision or link.visual):
-                relative = pose.actInv(self._posed.pose(link.name))
-                points = surface_points(link.collision or link.visual)
-                parts.append(points @ relative.rotation.T + relative.translation)
-        return np.concatenate(parts)
+    def _jaw_range(self, joint: Joint) -> tuple[float, float]:
+        """Return limits of a jaw without: closed, and a sector away from the palm."""
+        points = points_on(self.alone.links, self.palm)
+        values = np.linspace(-np.pi, np.pi, TURNS)
+        gaps: list[float] = []
+        for value in values:
+            self._posed.move({joint.name: value})
+            away = np.linalg.norm(points - self._tip(self.fingers[0]), axis=1)
+            gaps.append(float(away.min()))
+        closed = int(np.argmin(gaps))
+        step = round(OPENING / (2 * np.pi) * (TURNS - 1))
+        wide = [gaps[(closed + k * step) % (TURNS - 1)] for k in (-1, 1)]
+        opened = values[closed] + (OPENING if wide[1] > wide[0] else -OPENING)
+        low, high = sorted((float(values[closed]), float(opened)))
+        return low, high
 
     def _fingers(self) -> list[_Finger]:
         rigid = rigid_bodies(self.alone.links)
         links = {x.name: x for x in self.alone.links if x.joint is not None}
-        shaped = {x: self._points(x) for x in links}
+        shaped = {x: points_on(self.alone.links, x) for x in links}
         shaped = {name: points for name, points in shaped.items() if len(points)}
         chains: dict[str, list[Link]] = {}
         for name, link in links.items():
@@ -178,8 +181,7 @@ class _Hand:
         for name in shaped.keys() - inner:
             chain = chains[name]
             origin = self._posed.pose(name).actInv(self._posed.pose(chain[0].name))
-            away = np.linalg.norm(shaped[name] - origin.translation, axis=1)
-            tip = shaped[name][away > away.max() - TIP].mean(axis=0)
+            tip = jaw_tip(shaped[name], origin.translation)
             joints = tuple(x.joint for x in chain if x.joint is not None)
             fingers.append(_Finger(name, tip, chain[0].name, joints))
         order = list(links)
@@ -221,12 +223,12 @@ class _Hand:
     @cached_property
     def _against(self) -> Vector:
         """The point of the palm that a single jaw comes closest to, shape (3,), m."""
-        (joint, *_), (jaw,) = self.movable, self.fingers
-        tips: list[Vector] = []
-        for value in joint.range or (0.0, 0.0):
-            self._posed.move({joint.name: value})
+        (name, limits), *_ = self.ranges.items()
+        (jaw,), tips = self.fingers, list[Vector]()
+        for value in limits:
+            self._posed.move({name: value})
             tips.append(self._tip(jaw))
-        points = self._points(self.palm)
+        points = points_on(self.alone.links, self.palm)
         away = np.linalg.norm(points[:, None] - np.array(tips), axis=2).min(axis=1)
         return points[away.argmin()]
 
@@ -240,7 +242,6 @@ class _Hand:
         units: list[dict[str, float]] = []
         others: list[str] = []
         axes: list[Vector] = []
-        ranged = {joint.name for joint in self.movable}
         for finger in self.fingers:
             last = finger.joints[-1]
             axis = self._axis(last)
@@ -250,7 +251,7 @@ class _Hand:
                 cosine = float(self._axis(joint) @ axis)
                 leader = self._leaders[joint.name]
                 ratio = joint.mimic.ratio if joint.mimic else 1.0
-                if leader not in ranged:
+                if leader not in self.ranges:
                     continue
                 if joint.type == last.type and abs(cosine) > PARALLEL:
                     signs.setdefault(leader, float(np.sign(cosine * ratio)))
@@ -269,20 +270,19 @@ class _Hand:
     def _ways(self) -> tuple[dict[str, float], dict[str, float]]:
         """Return the values of joints open and closed, which are best together."""
         units, others, axes = self._bending()
-        joints = {joint.name: joint for joint in self.movable}
         opposed = [n for n in others if self._is_thumb(n, axes)]
-        held = {name: _zero(joints[name]) for name in others}
+        held = {name: _zero(self.ranges[name]) for name in others}
         best: tuple[float, dict[str, float], dict[str, float]] | None = None
         senses = list(product((1.0, -1.0), repeat=len(units)))[:MOST_CHOICES]
         for sense in senses:
             closed, opened = dict(held), dict(held)
             for unit, turn in zip(units, sense, strict=True):
                 for name, sign in unit.items():
-                    low, high = joints[name].range or (0.0, 0.0)
+                    low, high = self.ranges[name]
                     ends = (low, high) if sign * turn > 0 else (high, low)
                     opened[name], closed[name] = ends
                     if len(self.fingers) > 2:
-                        zero = _zero(joints[name])
+                        zero = _zero(self.ranges[name])
                         far = abs(closed[name] - zero) >= (high - low) / 2
                         opened[name] = zero if far else ends[0]
             cost = self._distances(closed)
@@ -291,8 +291,8 @@ class _Hand:
         assert best is not None
         _, opened, closed = best
         for name in opposed:
-            low, high = joints[name].range or (0.0, 0.0)
-            values = (_zero(joints[name]), low, high, (low + high) / 2)
+            low, high = self.ranges[name]
+            values = (_zero(self.ranges[name]), low, high, (low + high) / 2)
             gaps = [
                 min(self._gaps(opened | {name: x}, closed | {name: x})[0])
                 for x in values
@@ -302,14 +302,15 @@ class _Hand:
         return opened | self._constant, closed | self._constant
 
     def _is_thumb(self, leader: str, axes: list[Vector]) -> bool:
-        """Whether the fingers that a joint moves are parallel to no other."""
-        moved = [
+        """Whether a joint moves the only finger that is parallel to no other."""
+        lone = [
             k
-            for k, finger in enumerate(self.fingers)
-            if leader in (self._leaders[j.name] for j in finger.joints)
+            for k, axis in enumerate(axes)
+            if sum(abs(axis @ other) > ALIKE for other in axes) == 1
         ]
-        rest = [axis for k, axis in enumerate(axes) if k not in moved]
-        return all(abs(axes[k] @ axis) < ALIKE for k in moved for axis in rest)
+        return len(lone) == 1 and leader in {
+            self._leaders[j.name] for j in self.fingers[lone[0]].joints
+        }
 
     def _distances(self, values: dict[str, float]) -> float:
         """Return the sum of distances between tips, and of tips from the bases, m."""
@@ -398,9 +399,9 @@ class _Hand:
         return Frame.model_validate(fields)
 
 
-def _zero(joint: Joint) -> float:
-    """Return the value of a joint's range that is nearest to zero."""
-    low, high = joint.range or (0.0, 0.0)
+def _zero(limits: tuple[float, float]) -> float:
+    """Return the value of a range that is nearest to zero."""
+    low, high = limits
     return min(max(0.0, low), high)
 
 
