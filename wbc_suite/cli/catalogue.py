@@ -216,9 +216,7 @@ def _robot(file: Path, **given: Any) -> tuple[str, dict[str, list[str]]]:
 
 def _inferred(robot: "RobotDescription") -> dict[str, list[str]]:
     """Return what an import inferred, as texts."""
-    from wbc_suite.robot.adopt.grippers import infer_grippers
-
-    grippers, ready = infer_grippers(robot), robot.keyframe("ready")
+    ready = robot.keyframe("ready")
     return {
         "root": [f"{robot.root.kind}, first link '{robot.links[0].name}'"],
         "groups": [f"{name}: {', '.join(own)}" for name, own in robot.groups.items()],
@@ -226,7 +224,11 @@ def _inferred(robot: "RobotDescription") -> dict[str, list[str]]:
             f"{side}: frame '{frame}' on link '{robot.link_of(frame)}'"
             for side, frame in robot.hands.items()
         ],
-        "gripper": [f"{name}: {found.reason}" for name, found in grippers.items()],
+        "gripper": [
+            f"{name}: {synergy.reason}"
+            for name, own in robot.synergies.items()
+            for synergy in own
+        ],
         "ready": [", ".join(f"{name} {q:.3g}" for name, q in ready.items())],
     }
 

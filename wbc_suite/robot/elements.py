@@ -195,6 +195,7 @@ class Synergy(FrozenModel):
             grasp, such as `pinch`; -1 and 1 for other grasps. The frame of the same
             name, or else the `tcp`, gives the pose: the gripper approaches along z,
             fingers close along y and a bar lies along x.
+        reason: Why the values are these, if they were inferred.
     """
 
     name: Name
@@ -202,6 +203,7 @@ class Synergy(FrozenModel):
     open: dict[Name, Real]
     closed: dict[Name, Real]
     grasps: dict[Name, tuple[Command, Command]] = {}
+    reason: str = ""
 
     @model_validator(mode="after")
     def _same_joints(self) -> "Synergy":

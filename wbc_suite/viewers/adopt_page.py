@@ -15,7 +15,6 @@ from wbc_suite.control.walking.config import (
 from wbc_suite.envs.hold_check import hold_faults
 from wbc_suite.errors import WbcError
 from wbc_suite.robot import RobotDescription
-from wbc_suite.robot.adopt.grippers import Gripper, infer_grippers
 from wbc_suite.robot.adopt.importing import with_soles
 from wbc_suite.robot.adopt.missing_data import with_rotor
 from wbc_suite.robot.adopt.soles import guess_sole
@@ -39,7 +38,7 @@ class AdoptPage:
     """Serve a page that shows an imported robot, its guesses and its notes.
 
     Args:
-        robot: The imported robot; `grippers` and their frames are inferred from it.
+        robot: The imported robot.
         site: Server of the page.
         notes: What the import said.
         folder: Where `write` puts `robots/` and `controllers/`.
@@ -61,13 +60,11 @@ class AdoptPage:
         say: Callable[[str], None],
     ) -> None:
         self._folder, self._say = folder, say
-        self._grippers = infer_grippers(robot)
-        added = [g.tcp for g in self._grippers.values() if g.tcp is not None]
-        self.robot = _changed(robot, frames=(*robot.frames, *added))
+        self.robot = robot
         self.page = RobotPage(self.robot, site)
         self.site, self._gui = site, site.server.gui
         self.frames = {frame.name: frame for frame in self.robot.frames}
-        self.synergies = {name: g.synergy for name, g in self._grippers.items()}
+        self.synergies = {name: own[0] for name, own in robot.synergies.items()}
         self.handles: dict[str, viser.TransformControlsHandle] = {}
         self._soles: dict[str, list[viser.GuiInputHandle[float]]] = {}
         with self._gui.add_folder("Notes", expand_by_default=False):
@@ -94,7 +91,7 @@ class AdoptPage:
             initial_value=str(frame.role),
             hint=f"Role of the frame on '{frame.link}'.",
         )
-        self._gui.add_markdown(f"*{_reason(self.robot, frame, self._grippers)}*")
+        self._gui.add_markdown(f"*{_reason(self.robot, frame)}*")
         handle = self.handles[name] = self.site.server.scene.add_transform_controls(
             f"{self.page.follow(frame.link)}/{name}",
             scale=HANDLE,
@@ -119,7 +116,7 @@ class AdoptPage:
         self.frames[name] = self.frames[name].model_copy(update=changes)
 
     def _add_gripper(self, group: str) -> None:
-        self._gui.add_markdown(f"**{plain(group)}**: {self._grippers[group].reason}.")
+        self._gui.add_markdown(f"**{plain(group)}**: {self.synergies[group].reason}.")
         buttons = self._gui.add_button_group(plain(group), ("open", "closed", "swap"))
 
         @buttons.on_click
@@ -271,11 +268,10 @@ def _changed(robot: RobotDescription, **changes: Any) -> RobotDescription:
     return parse_model(RobotDescription, data | changes, source=robot.name)
 
 
-def _reason(robot: RobotDescription, frame: Frame, grippers: dict[str, Gripper]) -> str:
+def _reason(robot: RobotDescription, frame: Frame) -> str:
     """Return why a frame has its role and its place."""
-    for gripper in grippers.values():
-        if gripper.tcp is not None and gripper.tcp.name == frame.name:
-            return f"On '{frame.link}', between the fingers."
+    if any(frame.name == group.replace("gripper", "tcp") for group in robot.synergies):
+        return f"On '{frame.link}', between the fingers."
     kind = LIMBS.get(frame.role)
     groups = [g for g in robot.groups if kind and (kind in g or g == kind + "s")]
     if not groups:

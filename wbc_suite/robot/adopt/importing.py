@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 from wbc_suite import logs
 from wbc_suite.config_files import parse_model
 from wbc_suite.errors import DescriptionError, join_first, shortened
+from wbc_suite.robot.adopt.grippers import infer_grippers
 from wbc_suite.robot.adopt.limbs import (
     Limb,
     infer_frames,
@@ -133,6 +134,10 @@ def describe_import(
         "keyframes": {"ready": infer_ready(checked)} | keyframes,
     }
     robot = parse_model(RobotDescription, data | others, **how)
+    try:
+        robot = _with_grippers(robot, source, names.take)
+    except ValueError as error:  # of MuJoCo's compiler
+        raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
     if "ready" in keyframes:
         if keyframes["ready"] != keyframes.get("home") or feet_are_level(robot):
             return level_soles(robot, given, names.take)
@@ -161,6 +166,27 @@ def _with_motors(
     for text in said:
         LOG.warning("%s: %s.", source, text)
     return complete, (*said, *[NO_ARMATURES] * (complete != lifts))
+
+
+def _with_grippers(
+    robot: RobotDescription, source: Path, take: Callable[[str, str], str]
+) -> RobotDescription:
+    """Return the robot with the synergies and grasps of its grippers, which open."""
+    found = infer_grippers(robot)
+    frames, ready = list(robot.frames), dict(robot.keyframes["ready"])
+    for group, (synergy, tcp, reason) in found.items():
+        LOG.info("%s: %s: %s.", source, group, reason)
+        ready |= synergy.open
+        if tcp is not None:
+            frames.append(tcp.model_copy(update={"name": take(tcp.name, "frame")}))
+    update = {
+        "synergies": {group: (own.synergy,) for group, own in found.items()},
+        "frames": tuple(frames),
+        "keyframes": robot.keyframes | {"ready": ready},
+    }
+    return RobotDescription.model_validate(
+        {key: getattr(robot, key) for key in RobotDescription.model_fields} | update
+    )
 
 
 def _held(root: LinkFields, links: Sequence[Link], source: Path) -> LinkFields:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from wbc_suite.robot.adopt.jaws import closes_on_parent, is_hand
 from wbc_suite.robot.adopt.name_words import (
     END_WORDS,
     FINGERS,
@@ -63,12 +64,17 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
     A link without a known word in its names belongs to the limb of its parent. Branches
     of an arm form a gripper; a chain below a torso or the root is an arm. A single arm
     is the right one; several arms without a side are numbered. Two slides and a hinge
-    that move all others in a plane are a base. The fingers of a hand alone are arms.
+    that move all others in a plane are a base. The last joint of an arm is a gripper if
+    its link closes on what carries it. A hand alone is one gripper.
     One or two joints without a side beside two arms that have one are a head.
     """
     traits = _without_masts(_traits(links))
+    if is_hand(links, {own.kind for own in traits.values()}):
+        moving = tuple(link for link in links if link.joint is not None)
+        return (Limb(name="gripper", kind="gripper", links=moving),)
     if not any(own.kind == "arm" for own in traits.values()):
         traits = _fingers_as_arms(traits, _moving_parents(links))
+    traits = _with_jaws(links, traits)
     arms = list(dict.fromkeys(x.top for x in traits.values() if x.kind == "arm"))
     unnamed = [top for top in arms if not traits[top].side]
     grippers = [x.side for x in traits.values() if x.kind == "gripper"]
@@ -190,6 +196,29 @@ def _fingers_as_arms(
             above = changed.get(parents[name] or "", _Traits())
             top = above.top if above.kind == "arm" else name
             changed[name] = _Traits("arm", "", top)
+    return changed
+
+
+def _with_jaws(links: Sequence[Link], traits: dict[str, _Traits]) -> dict[str, _Traits]:
+    """Return the traits with a last link that closes on its parent as a gripper.
+
+    What carries it belongs to the arm.
+    """
+    above, changed = _moving_parents(links), dict(traits)
+    carried = Counter(above.values())
+    for name, own in traits.items():
+        parent = above[name]
+        if carried[name] or parent is None or own.kind not in ("arm", "gripper"):
+            continue
+        chain = [parent]
+        while traits[chain[-1]].kind == "gripper" and (top := above[chain[-1]]):
+            chain.append(top)
+        single = all(carried[x] == 1 for x in chain[: len(chain) - 1] or chain)
+        arm = traits[chain[-1]]
+        if not single or arm.kind != "arm" or not closes_on_parent(links, name):
+            continue
+        changed |= dict.fromkeys(chain[:-1], arm)
+        changed[name] = _Traits("gripper", own.side, name)
     return changed
 
 
