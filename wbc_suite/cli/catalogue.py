@@ -217,6 +217,7 @@ def _robot(file: Path, **given: Any) -> tuple[str, dict[str, list[str]]]:
 def _inferred(robot: "RobotDescription") -> dict[str, list[str]]:
     """Return what an import inferred, as texts."""
     from wbc_suite.robot.adopt.grippers import infer_grippers
+    from wbc_suite.robot.wheel_drive import WheelDrive
 
     grippers, ready = infer_grippers(robot), robot.keyframe("ready")
     return {
@@ -228,6 +229,7 @@ def _inferred(robot: "RobotDescription") -> dict[str, list[str]]:
         ],
         "gripper": [f"{name}: {found.reason}" for name, found in grippers.items()],
         "ready": [", ".join(f"{name} {q:.3g}" for name, q in ready.items())],
+        **({"drive": [str(WheelDrive(robot))]} if robot.wheels else {}),
     }
 
 
