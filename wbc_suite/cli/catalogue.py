@@ -216,6 +216,8 @@ def _robot(file: Path, **given: Any) -> tuple[str, dict[str, list[str]]]:
 
 def _inferred(robot: "RobotDescription") -> dict[str, list[str]]:
     """Return what an import inferred, as texts."""
+    from wbc_suite.robot.wheel_drive import WheelDrive
+
     ready = robot.keyframe("ready")
     return {
         "root": [f"{robot.root.kind}, first link '{robot.links[0].name}'"],
@@ -230,6 +232,7 @@ def _inferred(robot: "RobotDescription") -> dict[str, list[str]]:
             for synergy in own
         ],
         "ready": [", ".join(f"{name} {q:.3g}" for name, q in ready.items())],
+        **({"drive": [str(WheelDrive(robot))]} if robot.wheels else {}),
     }
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Joint
+from wbc_suite.robot.wheel_drive import WHEELS
 
 _ORDER = (
     "right_arm",
@@ -39,14 +40,18 @@ def parts_of(robot: RobotDescription) -> dict[str, tuple[str, ...]]:
     """Return the parts that a robot has, with their driven joints.
 
     An arm is called by its side (`right_arm` is `right`), the joints of a planar root
-    are `base`, and any other group keeps its name. Arms come first, then torso, head,
-    base, legs and all others. Grippers with synergies are no parts: they belong to
-    their arms.
+    or the wheels of a free one are `base`, and any other group keeps its name. Arms
+    come first, then torso, head, base, legs and all others. Grippers with synergies are
+    no parts: they belong to their arms.
     """
     driven = set(motors(robot))
     groups = {k: v for k, v in robot.groups.items() if k not in robot.synergies}
     if robot.root.kind == "planar":
         groups = {"base": robot.root_joint_names} | groups
+    wheels = groups.pop(WHEELS, ())
+    if robot.root.kind == "free" and wheels:
+        driven |= {*wheels}
+        groups = {"base": wheels} | groups
     found: dict[str, tuple[str, ...]] = {}
     for group in sorted(groups, key=_rank):
         joints = tuple(joint for joint in groups[group] if joint in driven)

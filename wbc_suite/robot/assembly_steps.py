@@ -11,7 +11,7 @@ from wbc_suite.robot.elements import Link
 from wbc_suite.robot.poses import joint_motion, pose_fields, se3_of
 from wbc_suite.robot.shapes import Drawn, Shape
 
-LISTS = ("frames", "cameras", "actuators", "sensors", "connects", "tendons")
+LISTS = ("frames", "cameras", "actuators", "sensors", "connects", "tendons", "wheels")
 """Lists of a component that are joined in an assembly."""
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def prefixed(
             for s in component.synergies
         ),
     }
-    elsewhere |= {"name": items, "frame": items}
+    elsewhere |= {"name": items, "frame": items, "steering": bodies}
     for field in LISTS:
         own = getattr(component, field)
         update[field] = tuple(_prefixed(item, elsewhere) for item in own)
@@ -132,6 +132,7 @@ def locked(data: dict[str, Any], groups: tuple[str, ...]) -> dict[str, Any]:
             for name, values in data["keyframes"].items()
         },
         "actuators": [a for a in data["actuators"] if a.joint not in names],
+        "wheels": [w for w in data["wheels"] if not {w.joint, w.steering} & names],
         "synergies": {g: s for g, s in data["synergies"].items() if g not in groups},
     }
 

@@ -258,6 +258,25 @@ class Tendon(FrozenModel):
     held: Real | None = None
 
 
+class Wheel(FrozenModel):
+    """A wheel that drives the robot, see `robot.wheel_drive`.
+
+    Attributes:
+        joint: Hinge of the wheel, with an actuator of kind `velocity`.
+        radius: m.
+        roller: Angle about the vertical from the direction in which the wheel rolls to
+            the axis of the roller on the ground, rad: 0 of an omnidirectional wheel,
+            +-pi/4 of a mecanum wheel; none for a tyre.
+        steering: Hinge that steers the wheel, if one does, with an actuator of kind
+            `position`.
+    """
+
+    joint: Name
+    radius: Positive
+    roller: Real | None = None
+    steering: Name | None = None
+
+
 class Contacts(FrozenModel):
     """Pairs of links that never collide with each other."""
 
@@ -316,6 +335,7 @@ class Elements(FrozenModel):
     sensors: tuple[Sensor, ...] = Field(default=(), alias="sensor")
     connects: tuple[Connect, ...] = Field(default=(), alias="connect")
     tendons: tuple[Tendon, ...] = Field(default=(), alias="tendon")
+    wheels: tuple[Wheel, ...] = Field(default=(), alias="wheel")
     groups: dict[Name, tuple[Name, ...]] = {}
     keyframes: dict[Name, dict[Name, float]] = Field(default={}, alias="keyframe")
     contacts: Contacts = Contacts()

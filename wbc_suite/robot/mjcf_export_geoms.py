@@ -57,7 +57,7 @@ def add_collision_geoms(
         if shape.solref is not None:
             geom.solref[:2] = shape.solref
             geom.solmix = STATED_SOLMIX
-        for key in ("friction", "condim", "margin"):
+        for key in ("friction", "condim", "margin", "priority"):
             if (value := getattr(shape, key)) is not None:
                 setattr(geom, key, value)
 

@@ -113,6 +113,7 @@ class ShapeFields(FrozenModel):
         condim: Contact dimension.
         solref: Time constant in s and damping ratio of the contact.
         margin: Distance in m at which contacts become active.
+        priority: Of two shapes in contact the greater one's friction counts.
     """
 
     pos: Vector3 = (0.0, 0.0, 0.0)
@@ -122,6 +123,7 @@ class ShapeFields(FrozenModel):
     condim: Literal[1, 3, 4, 6] | None = None
     solref: tuple[Real, Real] | None = None
     margin: Real | None = None
+    priority: Literal[0, 1] | None = None
 
     _rpy = model_validator(mode="before")(_convert_rpy)
 

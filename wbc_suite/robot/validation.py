@@ -122,6 +122,8 @@ def _references(
         yield f"sensor '{sensor.name}'", "frame", sensor.frame
     for actuator in robot.actuators:
         yield "an actuator", "joint", actuator.joint
+    wheels = [joint for w in robot.wheels for joint in (w.joint, w.steering) if joint]
+    yield from (("a wheel", "joint", joint) for joint in wheels)
     for name in itertools.chain(*robot.contacts.exclude):
         yield "contacts.exclude", "link", name
     for name in itertools.chain(*((c.link, c.other) for c in robot.connects)):

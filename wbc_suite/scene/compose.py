@@ -20,6 +20,7 @@ SMALL = 24
 them a step of Lift takes 6 % less at 15 and 18, as long at 30 and 15 % more at 60."""
 
 GROUNDED = 0.03  # depth by which feet and mounts may reach into the floor, m
+CLEARANCE = 2e-3  # m, of the wheels of a base that a planar root moves
 LANDED = 0.005  # distance of free feet from the floor that is left as it is, m
 
 ROBOT_VIEW = "robotview"
@@ -52,16 +53,21 @@ def _on_the_floor(robot: RobotDescription) -> RobotDescription:
     """Raise a robot without a root height so that it stands on the floor.
 
     The URDF of many a humanoid has its origin in the pelvis. A free robot on feet is
-    also put down, since the legs of one in the air kick.
+    also put down, since the legs of one in the air kick, and one on wheels. The wheels
+    of a planar root do not touch the floor, on which they would drag.
     """
     feet = any(frame.role == "foot" for frame in robot.frames)
-    stands = robot.root.kind == "free" and feet
-    if any(robot.root.pos) and not stands:
+    glides = robot.root.kind == "planar" and bool(robot.wheels)
+    stands = robot.root.kind == "free" and (feet or bool(robot.wheels))
+    if any(robot.root.pos) and not (stands or glides):
         return robot
-    height = _lowest_point(robot)
-    if (abs(height) < LANDED) if stands else (height > -GROUNDED):
+    height = _lowest_point(robot) - (CLEARANCE if glides else 0.0)
+    least = -GROUNDED if not (stands or glides) else 0.0 if glides else -LANDED
+    most = LANDED if stands or glides else np.inf
+    if least < height < most:
         return robot
-    log.warning(
+    level = log.info if robot.wheels else log.warning
+    level(
         "%s has its lowest point %.3f m %s the floor, and is moved onto it. Set "
         "[root] pos in its file.",
         *(robot.name, abs(height), "below" if height < 0.0 else "above"),

@@ -164,7 +164,8 @@ class BasicController:
 def _holding_laws(state: RobotState, driven: set[str]) -> tuple[JointLaw, ServoLaw]:
     """Return laws that hold the joints of no part, by torque and by setpoint."""
     idle = [joint for joint in state.actuators if joint not in driven]
-    torques, gains = set(motors(state.robot)), JointLawConfig()
+    robot, gains = state.robot, JointLawConfig()
+    torques = {*motors(robot), *(wheel.joint for wheel in robot.wheels)}
     return (
         JointLaw(state, [j for j in idle if j in torques], kp=gains.kp, kd=gains.kd),
         ServoLaw(state, [j for j in idle if j not in torques]),
@@ -195,6 +196,8 @@ def check_basic(
             raise ConfigError(f"{where}: {error}") from error
     kinds = [part_controller(part) for part in read.body_parts.values()]
     stands = any(kind.holds_root for kind in kinds)
+    feet = any(frame.role == "foot" for frame in robot.frames)
+    stands |= bool(robot.wheels) and not feet
     if robot.root.kind == "free" and not (stands or read.may_fall):
         raise ConfigError(
             f"{source}: key 'body_parts': {robot.name} has a free root, and no part "
@@ -217,7 +220,8 @@ def default_basic_config(robot: RobotDescription) -> dict[str, Any]:
     }
     if "base" in parts:
         parts["base"] = {"type": "BASE_VELOCITY"}
-    if robot.root.kind == "free" and parts:
+    on_wheels = robot.wheels and "legs" not in parts
+    if robot.root.kind == "free" and parts and not on_wheels:
         legs = [name for name in parts if name not in hands] or list(parts)
         parts["legs" if "legs" in parts else legs[-1]] = {"type": "STANCE"}
     return {"format": 1, "body_parts": parts}

@@ -220,12 +220,16 @@ def default_composite(
 ) -> str:
     """Return the composite of a robot that is asked for none.
 
-    On its own feet, with a file for it: WHOLE_BODY_ID. What else has feet or no hand:
+    On wheels that touch the floor: BASIC. On its own feet, with a file for it:
+    WHOLE_BODY_ID. What else has feet or no hand:
     WHOLE_BODY_IK. Arms on a base that drives: HYBRID_MOBILE_BASE. Other arms: BASIC.
     """
     if robot.root.kind == "free" and _walks(robot, catalogue or Catalogue()):
         return "WHOLE_BODY_ID"
-    if not robot.hands or any(frame.role == "foot" for frame in robot.frames):
+    feet = any(frame.role == "foot" for frame in robot.frames)
+    if robot.root.kind == "free" and robot.wheels and not feet:
+        return "BASIC"
+    if not robot.hands or feet:
         return "WHOLE_BODY_IK"
     driven = robot.root.kind == "planar" and robot.root.actuated
     return "HYBRID_MOBILE_BASE" if driven else "BASIC"

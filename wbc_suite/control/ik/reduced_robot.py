@@ -9,16 +9,18 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.assembly_steps import locked
+from wbc_suite.robot.wheel_drive import WHEELS
 from wbc_suite.typing import Indices, Vector
 
 
 def lock_groups(robot: RobotDescription, groups: Sequence[str]) -> RobotDescription:
-    """Return the robot with some groups, and all its grippers, fixed at `ready`.
+    """Return the robot with some groups, grippers and wheels fixed at `ready`.
 
     Fewer joints make every solve cheaper, and the same description feeds both IK
     backends. UnknownNameError if the robot has no such group.
     """
-    fixed = tuple(dict.fromkeys((*groups, *gripper_groups(robot))))
+    wheels = [WHEELS] if WHEELS in robot.groups else []
+    fixed = tuple(dict.fromkeys((*groups, *gripper_groups(robot), *wheels)))
     given = {key: getattr(robot, key) for key in RobotDescription.model_fields}
     fields = locked(given, fixed) | {"connects": (), "sensors": (), "tendons": ()}
     return RobotDescription.model_validate(fields)

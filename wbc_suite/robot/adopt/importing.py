@@ -26,11 +26,13 @@ from wbc_suite.robot.adopt.missing_data import (
 )
 from wbc_suite.robot.adopt.soles import level_soles
 from wbc_suite.robot.adopt.standing_posture import feet_are_level, standing_legs
+from wbc_suite.robot.adopt.wheels import find_wheels
 from wbc_suite.robot.adopt.working_posture import working_arms
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
 from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
 from wbc_suite.robot.validation import RESERVED
+from wbc_suite.robot.wheel_drive import WHEELS, WheelDrive
 
 LOG = logs.logger(__name__)
 
@@ -118,7 +120,23 @@ def describe_import(
     how: dict[str, Any] = {"source": str(source), "error": DescriptionError}
     roles = [x | {"role": infer_role(x["name"])} for x in frames]
     given = [parse_model(Frame, x, **how) for x in roles]
-    limbs = infer_limbs(checked)
+    driven = {fields["joint"] for fields in others.get("actuators", ())}
+    wheeled = find_wheels(
+        checked,
+        infer_ready(checked),
+        root=root,
+        take=names.take,
+        driven=driven,
+        name=name,
+    )
+    kinds, wheels = dict[str, str](), ()
+    if wheeled is not None:
+        checked, kinds, wheels = list(wheeled.links), wheeled.kinds, wheeled.joints
+        root = wheeled.root or root
+        kept = [x for x in others.get("actuators", ()) if x["joint"] not in wheels]
+        others["actuators"] = [*kept, *wheeled.actuators]
+        others["wheels"] = wheeled.wheels
+    limbs = infer_limbs(checked, kinds)
     placed = infer_frames(checked, limbs, given, names.take)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
     complete, deviations = _with_motors(checked, placed, actuated, limbs, source)
@@ -130,7 +148,7 @@ def describe_import(
         "links": complete,
         "frames": placed,
         "deviations": deviations,
-        "groups": {limb.name: limb.joints for limb in limbs if limb.joints},
+        "groups": _groups(limbs, wheels),
         "keyframes": {"ready": infer_ready(checked)} | keyframes,
     }
     robot = parse_model(RobotDescription, data | others, **how)
@@ -138,6 +156,9 @@ def describe_import(
         robot = _with_grippers(robot, source, names.take)
     except ValueError as error:  # of MuJoCo's compiler
         raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
+    if wheeled is not None:
+        kept = "the root is planar" if wheeled.root else "wheels are on legs"
+        LOG.warning("%s: it drives, and %s: %s.", source, kept, WheelDrive(robot))
     if "ready" in keyframes:
         if keyframes["ready"] != keyframes.get("home") or feet_are_level(robot):
             return level_soles(robot, given, names.take)
@@ -148,6 +169,12 @@ def describe_import(
         return _with_ready(level_soles(robot, given, names.take), working_arms)
     except ValueError as error:  # of MuJoCo's compiler
         raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
+
+
+def _groups(limbs: Sequence[Limb], wheels: Sequence[str]) -> dict[str, Sequence[str]]:
+    """Return the joints of limbs by name, and those of wheels as their own group."""
+    found = {x.name: [j for j in x.joints if j not in wheels] for x in limbs}
+    return {n: own for n, own in (found | {WHEELS: wheels}).items() if own}
 
 
 def _with_motors(

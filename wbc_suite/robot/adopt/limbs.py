@@ -4,7 +4,7 @@ Words of names and the structure of the tree give them. Users edit the result.
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -58,8 +58,10 @@ class _Traits(NamedTuple):
     top: str = ""
 
 
-def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
-    """Sort the moving links into limbs.
+def infer_limbs(
+    links: Sequence[Link], kinds: Mapping[str, str] | None = None
+) -> tuple[Limb, ...]:
+    """Sort the moving links into limbs; `kinds` are known, by name of the link.
 
     A link without a known word in its names belongs to the limb of its parent. Branches
     of an arm form a gripper; a chain below a torso or the root is an arm. A single arm
@@ -68,7 +70,7 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
     its link closes on what carries it. A hand alone is one gripper.
     One or two joints without a side beside two arms that have one are a head.
     """
-    traits = _without_masts(_traits(links))
+    traits = _without_masts(_traits(links, kinds or {}))
     if is_hand(links, {own.kind for own in traits.values()}):
         moving = tuple(link for link in links if link.joint is not None)
         return (Limb(name="gripper", kind="gripper", links=moving),)
@@ -106,7 +108,7 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
     )
 
 
-def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
+def _traits(links: Sequence[Link], kinds: Mapping[str, str]) -> dict[str, _Traits]:
     """Return kind, side and top of each moving link, by name."""
     parents, said = _moving_parents(links), _words(links)
     owners, driving = list(parents.values()), _planar_base(links, parents)
@@ -129,6 +131,7 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
             rolls = above.kind == "base" and parent not in driving  # rim of a wheel
             inherits = rolls or above.kind in ("leg", "gripper", "head")
             kind = above.kind if inherits else "arm"
+        kind = kinds.get(link.name, kind)
         if kind == "base" and above.kind == "leg":
             kind = "leg"  # on wheels
         if kind == "torso" and side_of(words, pairs=False):
