@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from wbc_suite.errors import ConfigError, DescriptionError
+from wbc_suite.errors import DescriptionError
 from wbc_suite.files import read_bytes
 from wbc_suite.typing import Indices, Matrix
 
