@@ -46,7 +46,7 @@ bench: $(VENV)/.installed-dev ## run every benchmark: docs/benchmarks.md, artifa
 	$(PY) docs/write_benchmarks.py $(ARGS)
 
 # Peers get environments of their own where they ask for other versions than ours.
-bench-peers: $(VENV)/.installed-peers .venv-placo/.installed .venv-robosuite/.installed .venv-robosuite-demos/.installed .venv-cluster/.installed .venv-clients/.installed .venv-accelerators/.installed ## install what benchmarks and tests compare or work with
+bench-peers: $(VENV)/.installed-peers .venv-placo/.installed .venv-pybullet/.installed .venv-drake/.installed .venv-usd/.installed .venv-robosuite/.installed .venv-robosuite-demos/.installed .venv-cluster/.installed .venv-clients/.installed .venv-accelerators/.installed ## install what benchmarks and tests compare or work with
 
 $(VENV)/.installed-peers: $(VENV)/.installed-dev
 	$(PY) -m pip install --disable-pip-version-check --group peers

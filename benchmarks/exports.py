@@ -10,6 +10,7 @@ Usage: python benchmarks/exports.py [--quick] [--only TEXT] [--json FILE]
 """
 
 import datetime
+import importlib.util
 import json
 import subprocess
 import sys
@@ -33,7 +34,7 @@ PAGE = HERE.parent / "docs" / "robots.md"
 MARKS = "<!-- exports -->", "<!-- end of exports -->"
 CONFIGURATIONS = 20
 POSE, MASS = 1e-6, 1e-3  # largest deviations, m or of rotation matrices, and kg
-SIDES = ("pybullet", "yourdfpy", "placo", "drake")
+SIDES = ("pybullet", "yourdfpy", "placo", "drake", "usd")
 Row = dict[str, Any]
 Values = Mapping[str, float]
 
@@ -75,31 +76,38 @@ def write_case(name: str, folder: Path) -> tuple[RobotDescription, Path]:
     fixed = robot.root.kind == "fixed"
     chained = robot.root.kind != "free"
     rooted = dict(yourdfpy=fixed, placo=False, pybullet=chained, drake=chained)
-    kinds = {"yourdfpy": "plain", "placo": "pinocchio"}
+    rooted["usd"] = False
+    kinds = {"yourdfpy": "plain", "placo": "pinocchio", "usd": "isaac"}
+    at_zero = dict.fromkeys(values[0], 0.0)
     content: dict[str, Any] = {
         "joints": list(values[0]),
         "values": [list(row.values()) for row in values],
         "frames": [x.name for x in (*robot.links, *robot.frames)],
         "poses": our_poses(robot, values),
+        "zeros": [list(at_zero.values())],
+        "poses_at_zero": our_poses(robot, [at_zero]),
         "mass": robot.mass,
     }
     for reader in SIDES:
-        file = next((own / kinds.get(reader, reader)).glob("*.urdf"))
+        kind = "*.xml" if reader == "usd" else "*.urdf"
+        file = next((own / kinds.get(reader, reader)).glob(kind))
         content[f"file_{reader}"] = str(file.relative_to(own))
         content[f"rooted_{reader}"] = rooted[reader]
     np.savez(folder / f"{name}.npz", **content)
     return robot, own
 
 
-def in_mujoco(path: Path, case: Path, *, frames: bool) -> Row:
+def in_mujoco(path: Path, case: Path) -> Row:
     """Return deviations of poses and mass of a URDF or MJCF file in MuJoCo.
 
-    Of a URDF MuJoCo fuses what is fixed; its poses are those of moving links.
+    Frames are bodies in a URDF, and sites in an MJCF.
     """
     m, data = mujoco.MjModel.from_xml_path(str(path)), np.load(case)
     d, worst = mujoco.MjData(m), 0.0
     bodies = [m.body(i).name for i in range(1, m.nbody)]
+    sites = [m.site(i).name for i in range(m.nsite)]
     first, names = bodies[0], data["frames"].tolist()
+    assert {*bodies, *sites} == set(names)
     for values, expected in zip(data["values"], data["poses"], strict=True):
         for name, value in zip(data["joints"].tolist(), values, strict=True):
             if not name.startswith("root_"):
@@ -108,9 +116,7 @@ def in_mujoco(path: Path, case: Path, *, frames: bool) -> Row:
         own, ours = matrix(d.body(first)), expected[names.index(first)]
         base = ours @ np.linalg.inv(own)
         found = [(name, matrix(d.body(name))) for name in bodies]
-        if frames:
-            sites = [m.site(i).name for i in range(m.nsite)]
-            found += [(name, matrix(d.site(name))) for name in sites if name in names]
+        found += [(name, matrix(d.site(name))) for name in sites]
         for name, T in found:
             worst = max(worst, np.abs(base @ T - expected[names.index(name)]).max())
     return {"pose": float(worst), "mass": abs(float(m.body_mass.sum() - data["mass"]))}
@@ -146,7 +152,8 @@ def in_pinocchio(robot: RobotDescription, folder: Path, case: Path) -> Row:
             worst,
             *(np.abs(base @ T - E).max() for T, E in zip(found, expected, strict=True)),
         )
-    mass = abs(pin.computeTotalMass(model) - float(data["mass"]))
+    own_mass = sum(inertia.mass for inertia in model.inertias)  # the universe's, too
+    mass = abs(own_mass - float(data["mass"]))
     return {
         "pose": float(worst),
         "mass": float(mass),
@@ -169,6 +176,8 @@ def pairs_differ(robot: RobotDescription, model: Any, urdf: str, srdf: str) -> i
 
 def python_of(reader: str, environments: Path) -> Path | None:
     """Return the interpreter of a reader's environment, or None if there is none."""
+    if importlib.util.find_spec(reader):
+        return Path(sys.executable)
     for folder in (environments / f".venv-{reader}", environments / reader):
         if (folder / "bin" / "python").is_file():
             return folder / "bin" / "python"
@@ -237,8 +246,8 @@ def main() -> None:
             plain = own / "plain" / "robot.urdf"
             mjcf = next((own / "isaac").glob("*.xml"))
             found = {
-                "MuJoCo, URDF": in_mujoco(plain, case, frames=False),
-                "MuJoCo, MJCF": in_mujoco(mjcf, case, frames=True),
+                "MuJoCo, URDF": in_mujoco(plain, case),
+                "MuJoCo, MJCF": in_mujoco(mjcf, case),
                 "Pinocchio": in_pinocchio(robot, own / "pinocchio", case),
             }
             report.rows += [

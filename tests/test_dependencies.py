@@ -19,6 +19,8 @@ DISTRIBUTIONS = {
     "pinocchio": "pin",
     "collada": "pycollada",
     "pink": "pin-pink",
+    "pxr": "usd-core",
+    "pydrake": "drake",
     "sbx": "sbx-rl",
     "xdist": "pytest-xdist",
 }

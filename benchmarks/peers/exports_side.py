@@ -137,7 +137,32 @@ class Drake:
         return self._plant.get_frame(FrameIndex(index))
 
 
+class Usd:
+    """The USD that `mujoco-usd-converter` makes of an MJCF; its joints stand at 0."""
+
+    def __init__(self, path: Path) -> None:
+        import mujoco_usd_converter
+        from pxr import Usd as usd
+        from pxr import UsdGeom, UsdPhysics
+
+        folder = str(path.parent / "usd")
+        asset = mujoco_usd_converter.Converter().convert(str(path), folder)
+        stage, cache = usd.Stage.Open(asset.path), UsdGeom.XformCache()
+        self._poses: Poses = {}
+        self.mass = 0.0
+        for prim in stage.Traverse():
+            T = np.array(cache.GetLocalToWorldTransform(prim)).T
+            self._poses.setdefault(prim.GetName(), T)
+            if prim.HasAPI(UsdPhysics.MassAPI):
+                self.mass += UsdPhysics.MassAPI(prim).GetMassAttr().Get() or 0.0
+
+    def poses(self, values: dict[str, float]) -> Poses:
+        assert not any(values.values())
+        return self._poses
+
+
 READERS = {
+    "usd": Usd,
     "pybullet": PyBullet,
     "yourdfpy": Yourdfpy,
     "placo": Placo,
@@ -151,7 +176,10 @@ def measure(case: Path, reader: str) -> dict[str, object]:
     model = READERS[reader](case.with_suffix("") / str(data[f"file_{reader}"]))
     rooted = bool(data[f"rooted_{reader}"])
     worst, first = 0.0, str(data["frames"][0])
-    for values, expected in zip(data["values"], data["poses"], strict=True):
+    rows = "values", "poses"
+    if reader == "usd":
+        rows = "zeros", "poses_at_zero"
+    for values, expected in zip(data[rows[0]], data[rows[1]], strict=True):
         found = model.poses(dict(zip(data["joints"].tolist(), values, strict=True)))
         base = np.eye(4) if rooted else np.linalg.inv(found[first])
         own = np.eye(4) if rooted else np.linalg.inv(expected[0])

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 from PIL import Image
 
@@ -112,6 +113,21 @@ def test_a_urdf_comes_in_and_is_edited_as_toml(command, tmp_path):
     code, out, _ = command("check", toml)
     assert code == 0
     assert "8 dof" in out
+
+
+@pytest.mark.slow
+def test_a_robot_is_exported_for_a_reader(command, tmp_path):
+    code, out, _ = command(
+        "export", "Go2", "--for", "pinocchio", "-o", tmp_path / "new"
+    )
+    assert code == 0
+    assert "JointModelFreeFlyer" in out  # the file has no root
+    model = pin.buildModelFromUrdf(str(tmp_path / "new" / "go2.urdf"))
+    assert model.nv == 12
+    rooted = ("--for", "pybullet", "--root", "floating", "-o", tmp_path / "free")
+    assert command("export", "Go2", *rooted)[0] == 0
+    model = pin.buildModelFromUrdf(str(tmp_path / "free" / "go2.urdf"))
+    assert model.nv == 18
 
 
 @pytest.mark.slow
@@ -267,6 +283,8 @@ def _frame(film: Image.Image, number: int) -> Image.Image:
             ["export", "Baxter", "--to", "urdf", "--gripper", "rigth=PandaGripper"],
             ["rigth", "Did you mean 'right'"],
         ),
+        (["export", "Panda"], ["--to", "--for"]),
+        (["export", "Panda", "--to", "toml", "--root", "none"], ["--root", "URDF"]),
         (["list", "--catalogue", "nowhere"], ["nowhere", "does not exist"]),
         (["render", "Panda", "-o", "nowhere/a.png"], ["nowhere/a.png", "written"]),
         (["render", "Panda", "-o", "a.nonsense"], ["a.nonsense", "written"]),

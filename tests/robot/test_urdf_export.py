@@ -83,6 +83,7 @@ def test_mujoco_reads_the_robot_that_we_export(robot):
     ours = robot.to_mjspec().compile()
     theirs = mujoco.MjSpec.from_string(robot.to_urdf()).compile()
     assert (theirs.nq, theirs.nv) == (ours.nq, ours.nv)
+    assert theirs.body_mass.sum() == pytest.approx(robot.mass)  # a fixed base's, too
     d, e = mujoco.MjData(ours), mujoco.MjData(theirs)
     rng = np.random.default_rng(4)
     dense = np.zeros((2, ours.nv, ours.nv))
@@ -91,10 +92,11 @@ def test_mujoco_reads_the_robot_that_we_export(robot):
         d.qvel[:] = e.qvel[:] = rng.normal(size=ours.nv)
         mujoco.mj_forward(ours, d)
         mujoco.mj_forward(theirs, e)
-        for i in range(1, theirs.nbody):  # MuJoCo merges bodies that are fixed together
-            body = d.body(theirs.body(i).name)
-            np.testing.assert_allclose(e.xpos[i], body.xpos, atol=TOLERANCE)
-            np.testing.assert_allclose(e.xmat[i], body.xmat, atol=TOLERANCE)
+        for item in (*robot.links, *robot.frames):
+            place = (d.site if item in robot.frames else d.body)(item.name)
+            body = e.body(item.name)
+            np.testing.assert_allclose(body.xpos, place.xpos, atol=TOLERANCE)
+            np.testing.assert_allclose(body.xmat, place.xmat, atol=TOLERANCE)
         mujoco.mj_fullM(ours, d, dense[0])
         mujoco.mj_fullM(theirs, e, dense[1])
         dense[0] -= np.diag(ours.dof_armature)

@@ -7,7 +7,6 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 import pinocchio as pin
-from scipy.spatial import ConvexHull
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Actuator, Joint, rigid_bodies
@@ -15,6 +14,7 @@ from wbc_suite.robot.inertia import inertia_fields
 from wbc_suite.robot.mesh_files import write_stl
 from wbc_suite.robot.mjcf_export_geoms import VisualGeoms, add_collision_geoms
 from wbc_suite.robot.moving_inertias import moving_inertias
+from wbc_suite.robot.shape_geometry import convex_hull
 
 STOP_SOLREF = (0.004, 1.0)
 """Time constant in s and damping ratio of joint limits, the stiffest that is stable
@@ -115,10 +115,11 @@ def write_mjcf(robot: RobotDescription, *, mesh_dir: Path | None = None) -> str:
         vertices = np.array(mesh.attrib.pop("vertex").split(), np.float64)
         faces = np.array(mesh.attrib.pop("face", "").split(), np.int64)
         vertices = vertices.reshape(-1, 3)
+        triangles = vertices, faces.reshape(-1, 3)
         if not len(faces):
-            faces = ConvexHull(vertices).simplices.astype(np.int64)
+            triangles = convex_hull(vertices)
         file = f"{mesh_dir.name}/{mesh.get('name')}.stl"
-        write_stl(mesh_dir.parent / file, vertices, faces.reshape(-1, 3))
+        write_stl(mesh_dir.parent / file, *triangles)
         mesh.set("file", file)
     return ElementTree.tostring(tree, "unicode") + "\n"
 

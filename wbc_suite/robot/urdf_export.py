@@ -106,9 +106,10 @@ def urdf_tree(
     if root not in (None, "none", ROOT_TYPES[robot.root.kind]):
         robot = robot.with_root("free" if root == "floating" else root)
     tree = Element("robot", name=robot.name)
-    # For MuJoCo, which would infer masses that are absent and drop visual shapes.
+    # For MuJoCo, which would infer absent masses, drop visual shapes and lose frames.
     extension = SubElement(tree, "mujoco")
-    compiler = SubElement(extension, "compiler", inertiafromgeom="false")
+    fields = {"inertiafromgeom": "false", "fusestatic": "false"}
+    compiler = SubElement(extension, "compiler", fields)
     if mesh_dir is not None:
         compiler.attrib |= {"strippath": "false", "discardvisual": "false"}
     for name, rgba in robot.materials.items():
