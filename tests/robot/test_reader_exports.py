@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 
 import wbc_suite
 from wbc_suite.robot.collision_capsules import collision_pairs
@@ -365,3 +366,39 @@ def test_yaml_keeps_types():
     data = {"a": {"y": 1e-5, "b": True, "n": 3}, "names": ["on", "arm"], "c": 2.0}
     expected = 'a:\n  "y": 1.0e-05\n  b: true\n  "n": 3\nnames: ["on", arm]\nc: 2.0\n'
     assert yaml_text(data) == expected
+
+
+LABELLED = """<robot name="box"><link name="base"/>
+<link name="arm"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"
+ixy="0" ixz="0" iyz="0"/></inertial>
+<visual><geometry><mesh filename="part.stl"/></geometry></visual>
+<visual><geometry><mesh filename="label.stl"/></geometry></visual></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>
+<limit lower="-1" upper="1" effort="5" velocity="1"/></joint></robot>"""
+
+
+def test_an_imported_robot_takes_its_meshes_along(tmp_path):
+    """MuJoCo refuses a URDF with a label of two triangles; others take it."""
+    part = trimesh.creation.cone(radius=0.1, height=0.3)
+    corners = [[0, 0, 0.2], [0.01, 0, 0.2], [0.01, 0.01, 0.2], [0, 0.01, 0.2]]
+    label = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
+    part.export(tmp_path / "part.stl")
+    label.export(tmp_path / "label.stl")
+    (tmp_path / "box.urdf").write_text(LABELLED)
+    robot = wbc_suite.load_robot(tmp_path / "box.urdf", skin="meshes")
+    plain = tmp_path / "out" / "box.urdf"
+    plain.parent.mkdir()
+    plain.write_text(robot.to_urdf(mesh_dir=plain.parent / "box_meshes"))
+    export_for(robot, "ros2", tmp_path / "ros2")
+    counts = {}
+    for file in (plain, only(tmp_path / "ros2", "*.urdf")):
+        tree, folder = ElementTree.parse(file).getroot(), file.parents[2]
+        names = [
+            m.get("filename").removeprefix("package://") for m in tree.iter("mesh")
+        ]
+        counts[file.parent.name] = len(names)
+        local = plain.parent if file == plain else folder
+        own = trimesh.load_mesh(local / names[0])
+        np.testing.assert_allclose(own.bounds, part.bounds, atol=1e-6)
+    assert counts == {"out": 1, "urdf": 2}
+    assert mujoco.MjModel.from_xml_path(str(plain)).nmesh == 1

@@ -139,3 +139,11 @@ def _ring_faces(rings: int, segments: int) -> Indices:
         ]
     )
     return np.concatenate([band + segments * k for k in range(rings - 1)])
+
+
+def volume(vertices: Matrix, faces: Indices) -> float:
+    """Return the volume in m^3 that triangles enclose, seen from their mean corner."""
+    a, b, c = (
+        vertices[faces[:, k]] - vertices[faces].mean(axis=(0, 1)) for k in range(3)
+    )
+    return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6.0

@@ -25,12 +25,15 @@ from wbc_suite.robot.shapes import (
     Box,
     Capsule,
     Cylinder,
+    Drawn,
     Ellipsoid,
     Posed,
     Shape,
+    SkinMesh,
     Sphere,
 )
-from wbc_suite.robot.triangle_meshes import ellipsoid_mesh
+from wbc_suite.robot.triangle_meshes import ellipsoid_mesh, volume
+from wbc_suite.typing import Indices, Matrix
 
 UNLIMITED = 1e6
 """Written for limits that URDF requires and the robot lacks; read as no limit."""
@@ -38,6 +41,8 @@ ROOT_TYPES = {"fixed": "fixed", "free": "floating", "planar": "planar"}
 """Type of the URDF joint `root` by kind of root."""
 GYRATION = 1e-2
 """Radius of gyration of the mass `Dialect.light`, m."""
+FLAT = 1e-12
+"""m^3; a mesh of less volume, that of a cube of 0.1 mm, counts as flat."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -49,6 +54,7 @@ class Dialect:
             slides and a hinge, with the names of those in the engines' models.
         capsule: Tag of a capsule; without one it is a cylinder and two spheres.
         frames: Whether frames are links on fixed joints; they are omitted otherwise.
+        flat: Whether it reads meshes without volume, such as labels; MuJoCo refuses.
         light: Mass in kg of links without mass, for readers that assume another one;
             a moving link without mass takes that of the links fixed to it.
         mesh: Format of mesh files.
@@ -58,12 +64,13 @@ class Dialect:
     planar: bool = True
     capsule: str | None = None
     frames: bool = True
+    flat: bool = True
     light: float | None = None
     mesh: Literal["stl", "obj"] = "stl"
     mesh_prefix: str = ""
 
 
-PLAIN = Dialect()
+PLAIN = Dialect(flat=False)
 
 
 def write_urdf(
@@ -84,7 +91,8 @@ def write_urdf(
     - Frames become massless links on fixed joints.
     - A capsule becomes a cylinder and two spheres. Ellipsoids, hulls, lofts, cones and
       rounded boxes become their bounding boxes, or STL files in `mesh_dir`, which the
-      text refers to relative to the folder's parent.
+      text refers to relative to the folder's parent. A skin is written there, too, but
+      for flat pieces, which MuJoCo refuses.
     """
     return urdf_text(urdf_tree(robot, mesh_dir=mesh_dir, root=root))
 
@@ -250,7 +258,8 @@ def _link(
         element.append(_inertial(link))
     elif dialect.light is not None:
         element.append(_inertial(_light(link, dialect.light)))
-    for kind, shapes in (("visual", link.visual), ("collision", link.collision)):
+    drawn = link.visual if mesh_dir is None else robot.drawn(link)
+    for kind, shapes in (("visual", drawn), ("collision", link.collision)):
         for index, shape in enumerate(shapes):
             stem = f"{link.name}_{kind}{index}"
             for pose, geometry in _geometries(shape, stem, dialect, mesh_dir):
@@ -262,7 +271,7 @@ def _link(
     return element
 
 
-def _material(robot: RobotDescription, shape: Shape) -> Element:
+def _material(robot: RobotDescription, shape: Drawn) -> Element:
     if isinstance(shape.color, str) and shape.color in robot.materials:
         return Element("material", name=shape.color)
     color = (0.5, 0.5, 0.52) if isinstance(shape.color, str) else shape.color
@@ -274,20 +283,31 @@ def _material(robot: RobotDescription, shape: Shape) -> Element:
 
 
 def _geometries(
-    shape: Shape, stem: str, dialect: Dialect, mesh_dir: Path | None
+    shape: Drawn, stem: str, dialect: Dialect, mesh_dir: Path | None
 ) -> Iterator[tuple[pin.SE3, Element]]:
     """Yield the poses and geometries that represent one shape."""
     own = se3_of(shape)
-    mesh = None if mesh_dir is None else mesh_of(shape)
+    if mesh_dir is not None and (mesh := _surface(shape)) is not None:
+        if dialect.flat or volume(*mesh) >= FLAT:
+            file = f"{stem}.{dialect.mesh}"
+            write_mesh(mesh_dir / file, *mesh, kind=dialect.mesh)
+            name = f"{dialect.mesh_prefix}{mesh_dir.name}/{file}"
+            yield own, Element("mesh", filename=name)
+    elif not isinstance(shape, SkinMesh):
+        yield from _primitives(shape, dialect)
+
+
+def _surface(shape: Drawn) -> tuple[Matrix, Indices] | None:
+    """Return the vertices and faces of a shape that URDF lacks; None for others."""
     if isinstance(shape, Ellipsoid):
-        round_mesh = ellipsoid_mesh(np.asarray(shape.size))
-        mesh = round_mesh.vertices, round_mesh.faces
-    if mesh_dir is not None and mesh is not None:
-        file = f"{stem}.{dialect.mesh}"
-        write_mesh(mesh_dir / file, *mesh, kind=dialect.mesh)
-        name = f"{dialect.mesh_prefix}{mesh_dir.name}/{file}"
-        yield own, Element("mesh", filename=name)
-        return
+        mesh = ellipsoid_mesh(np.asarray(shape.size))
+        return mesh.vertices, mesh.faces
+    return mesh_of(shape)
+
+
+def _primitives(shape: Shape, dialect: Dialect) -> Iterator[tuple[pin.SE3, Element]]:
+    """Yield the poses and geometries of a shape, its bounding box if URDF lacks it."""
+    own = se3_of(shape)
     match shape:
         case Box(size=size):
             yield own, Element("box", size=numbers_text(2 * np.asarray(size)))

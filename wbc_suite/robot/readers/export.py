@@ -73,7 +73,7 @@ def _pybullet(robot: RobotDescription, folder: Path, root: UrdfRoot) -> str:
 def _pinocchio(robot: RobotDescription, folder: Path, root: UrdfRoot) -> str:
     """Write a URDF, and an SRDF with postures, rotor inertias and disabled pairs."""
     urdf, srdf = (folder / f"{file_stem(robot)}.{kind}" for kind in ("urdf", "srdf"))
-    tree = urdf_tree(robot, mesh_dir=folder / "meshes", root=root)
+    tree = urdf_tree(robot, Dialect(), mesh_dir=folder / "meshes", root=root)
     write_text(urdf, urdf_text(tree))
     write_text(srdf, write_srdf(robot, rooted=root != "none", pinocchio=True))
     own = {"planar": "Planar", "free": "FreeFlyer"}.get(robot.root.kind, "FreeFlyer")
