@@ -3,7 +3,7 @@
 Each robot of the catalogue is written for each reader. Readers load it in environments
 of their own (`make bench-peers`; a reader without one is left out) and place all links
 and frames at 20 random configurations, in which followers follow. Poses agree to 1e-6,
-masses to 1 g. Pairs of links that an SRDF leaves enabled are ours.
+masses to 1 g. Pairs of links that an SRDF or Drake lets collide are ours.
 
 Usage: python benchmarks/exports.py [--quick] [--only TEXT] [--json FILE]
        [--environments DIR] [--table]
@@ -87,6 +87,7 @@ def write_case(name: str, folder: Path) -> tuple[RobotDescription, Path]:
         "zeros": [list(at_zero.values())],
         "poses_at_zero": our_poses(robot, [at_zero]),
         "mass": robot.mass,
+        "pairs": [sorted(pair) for pair in collision_pairs(robot)],
     }
     for reader in SIDES:
         kind = "*.xml" if reader == "usd" else "*.urdf"

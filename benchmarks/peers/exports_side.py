@@ -3,10 +3,12 @@
 Usage: PYTHON exports_side.py READER FOLDER
 
 The folder has one `NAME.npz` for each robot, made by `benchmarks/exports.py`: names of
-joints and frames, joint positions, poses and the mass. One JSON object is printed: by
-robot the largest deviation of poses and of the mass, or an error.
+joints and frames, joint positions, poses, the mass and pairs that can collide. One JSON
+object is printed: by robot the largest deviation of poses and of the mass, and how many
+pairs differ where the file has them; or an error.
 """
 
+import itertools
 import json
 import logging
 import sys
@@ -102,20 +104,27 @@ class Drake:
         )
         from pydrake.systems.framework import DiagramBuilder
 
-        self._plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), 1e-3)
+        self._plant, scene = AddMultibodyPlantSceneGraph(DiagramBuilder(), 1e-3)
         self._plant.set_discrete_contact_approximation(
             DiscreteContactApproximation.kSap
         )
-        Parser(self._plant).AddModels(str(path))
+        (own,) = Parser(self._plant).AddModels(str(path))
         self._plant.Finalize()
         self._context = self._plant.CreateDefaultContext()
         self.mass = self._plant.CalcTotalMass(self._context)
         indices = self._plant.GetJointIndices()
         joints = [self._plant.get_joint(i) for i in indices]
         self._joints = {j.name(): j for j in joints if j.num_positions() == 1}
-        self.facts = {
-            "actuators": self._plant.num_actuators(),
-            "couplers": self._plant.num_constraints(),
+        shapes = scene.model_inspector()
+        first: dict[str, object] = {}
+        for index in self._plant.GetBodyIndices(own):
+            body = self._plant.get_body(index)
+            for shape in self._plant.GetCollisionGeometriesForBody(body):
+                first.setdefault(body.name(), shape)
+        self.pairs = {
+            frozenset(pair)
+            for pair in itertools.combinations(first, 2)
+            if not shapes.CollisionFiltered(*(first[name] for name in pair))
         }
 
     def poses(self, values: dict[str, float]) -> Poses:
@@ -187,8 +196,11 @@ def measure(case: Path, reader: str) -> dict[str, object]:
             if name not in found:
                 return {"error": f"no frame '{name}'"}
             worst = max(worst, float(np.abs(base @ found[name] - own @ T).max()))
-    deviation = abs(model.mass - float(data["mass"]))
-    return {"pose": worst, "mass": deviation, **getattr(model, "facts", {})}
+    found = {"pose": worst, "mass": abs(model.mass - float(data["mass"]))}
+    if hasattr(model, "pairs"):
+        ours = set(map(frozenset, data["pairs"].tolist()))
+        found["pairs"] = len(model.pairs ^ ours)
+    return found
 
 
 def main() -> None:

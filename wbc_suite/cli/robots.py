@@ -109,16 +109,24 @@ def export_robot(
 ) -> None:
     """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit.
 
-    --to writes one file in a format. A URDF gets a folder with meshes beside it for
-    shapes that URDF lacks.
+    --to writes one file. A URDF gets a folder of meshes beside it.
 
-    --for writes all that one reader takes: pybullet a URDF with all masses stated;
-    pinocchio a URDF, and an SRDF with postures, rotor inertias and disabled pairs;
-    drake a URDF with accelerations, rotor inertias, gains and collision filters; ros2
-    a description package with ros2_control, SRDF and controllers; isaac a URDF with
-    cameras, and an MJCF that becomes USD. It prints how to load them.
+    --for writes all that one reader takes, and prints how to load it:
 
-    Examples: wbc-suite export G1 --to urdf --root none -o g1.urdf;
+    pybullet: a URDF that states all masses
+
+    pinocchio: URDF, and SRDF with postures, rotor inertias and pairs
+
+    drake: a URDF with motors, gains, accelerations and collision filters
+
+    ros2: a package with ros2_control, controllers and SRDF for MoveIt
+
+    isaac: a URDF with cameras, and an MJCF that becomes USD
+
+    For example:
+
+    wbc-suite export G1 --to urdf --root none -o g1.urdf
+
     wbc-suite export Panda --for ros2 -o ws/src
     """
     from wbc_suite.atomic_files import write_bytes
