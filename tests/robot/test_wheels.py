@@ -115,8 +115,9 @@ def test_wheels_of_legs_are_no_joints_of_legs(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("root", ["planar", "free"])
-@pytest.mark.parametrize("name", [n for n in KINDS if n[:4] not in ("omni", "meca")])
+@pytest.mark.parametrize("name", [*KINDS, "legs"])
 def test_a_base_drives_2_m_and_turns(name: str, root: str, tmp_path: Path) -> None:
-    robot = _loaded(KINDS[name][0], tmp_path, root=root)
+    text = urdfs.quadruped() if name == "legs" else KINDS[name][0]
+    robot = _loaded(text, tmp_path, root=root)
     driven = drive_check(robot)
     assert driven.arrived, driven
