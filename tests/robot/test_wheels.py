@@ -43,6 +43,13 @@ def test_wheels_and_their_drive_are_found(name: str, tmp_path: Path) -> None:
     assert [*robot.groups] == ["wheels"]
 
 
+def test_the_name_of_a_mesh_tells_mecanum_wheels(tmp_path: Path) -> None:
+    mesh = '<visual><geometry><mesh filename="mecanum_a.stl"/></geometry></visual>'
+    head = '<link name="fl">'
+    robot = _loaded(urdfs.four("cart").replace(head, head + mesh), tmp_path)
+    assert WheelDrive(robot).kind is DriveKind.MECANUM
+
+
 @pytest.mark.parametrize("name", urdfs.NO_WHEELS)
 def test_what_only_turns_is_no_wheel(name: str, tmp_path: Path) -> None:
     robot = _loaded(urdfs.NO_WHEELS[name], tmp_path)

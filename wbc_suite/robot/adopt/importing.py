@@ -95,6 +95,7 @@ def describe_import(
     frames: Sequence[dict[str, Any]],
     names: NameTable,
     lines: Mapping[str, str] | None = None,
+    meshes: Mapping[str, str] | None = None,
     strict: bool = False,
     **others: Any,
 ) -> RobotDescription:
@@ -104,6 +105,7 @@ def describe_import(
     Inertias that no body can have are replaced by the nearest possible ones with a
     warning, or refused if the import is `strict`. An implausible inertia is only a
     warning, since some meshes may not be read. Messages tell the `lines` of links.
+    Names of files of `meshes`, by link, may tell mecanum wheels.
 
     Raises:
         DescriptionError: If the robot is inconsistent, or unphysical and `strict`.
@@ -128,6 +130,7 @@ def describe_import(
         take=names.take,
         driven=driven,
         name=name,
+        meshes=meshes,
     )
     kinds, wheels = dict[str, str](), ()
     if wheeled is not None:

@@ -35,8 +35,8 @@ ROLLERS = 4  # fewer links that turn on one are no rollers
 SLANTED = (
     0.35  # rad; rollers of mecanum wheels are turned by more, mostly by 45 degrees
 )
-MECANUM = {"mecanum", "mechanum", "mecanumwheel", "swedish"}
-OMNI = {"omni", "omniwheel", "omnidirectional"}
+SIDEWAYS = {"mecanum", "mechanum", "swedish", "omni", "omnidirectional"}
+"""Words for four parallel wheels that drive sideways, so they are mecanum wheels."""
 CASTERS = {"caster", "castor", "casters", "castors", "idler", "rotacastor"}
 
 GRIP = 1.0
@@ -121,6 +121,7 @@ def find_wheels(
     take: Callable[[str, str], str],
     driven: Collection[str] = (),
     name: str = "",
+    meshes: Mapping[str, str] | None = None,
 ) -> WheeledBase | None:
     """Return the wheels that a robot drives on, or None.
 
@@ -131,8 +132,9 @@ def find_wheels(
         take: Returns a free name near the given one, for a kind of element.
         driven: Joints with an actuator that is not a motor with an effort.
         name: Name of the robot.
+        meshes: Names of the files of meshes, by link.
     """
-    return _Search(links, ready, root, take, driven, name).base()
+    return _Search(links, ready, root, take, driven, name, meshes or {}).base()
 
 
 @dataclass
@@ -143,6 +145,7 @@ class _Search:
     take: Callable[[str, str], str]
     driven: Collection[str]
     name: str
+    meshes: Mapping[str, str]
 
     def __post_init__(self) -> None:
         links = self.links
@@ -332,8 +335,9 @@ class _Search:
                 return None
             return [w._replace(roller=w.roller or 0.0) for w in wheels]
         words = {word for w in wheels for word in self._words(w)}
-        words |= set(words_of(self.name))
-        if len(wheels) == 4 and (MECANUM & words) and wheels[0].roller is None:
+        files = (self.meshes.get(w.link.name, "") for w in wheels)
+        words |= {word for text in (self.name, *files) for word in words_of(text)}
+        if len(wheels) == 4 and SIDEWAYS & words and wheels[0].roller is None:
             middle = np.mean([w.centre for w in wheels], axis=0)
             return [w._replace(roller=_slant(w, middle)) for w in wheels]
         if any(w.roller is not None and abs(w.roller) < SLANTED for w in wheels):
