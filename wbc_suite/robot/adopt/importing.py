@@ -136,9 +136,7 @@ def describe_import(
     if wheeled is not None:
         checked, kinds, wheels = list(wheeled.links), wheeled.kinds, wheeled.joints
         root = wheeled.root or root
-        kept = [x for x in others.get("actuators", ()) if x["joint"] not in wheels]
-        others["actuators"] = [*kept, *wheeled.actuators]
-        others["wheels"] = wheeled.wheels
+        others |= wheeled.fields(others.get("actuators", ()))
     limbs = infer_limbs(checked, kinds)
     placed = infer_frames(checked, limbs, given, names.take)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
@@ -160,8 +158,8 @@ def describe_import(
     except ValueError as error:  # of MuJoCo's compiler
         raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
     if wheeled is not None:
-        kept = "the root is planar" if wheeled.root else "wheels are on legs"
-        LOG.warning("%s: it drives, and %s: %s.", source, kept, WheelDrive(robot))
+        on = "its root is planar" if wheeled.root else "on legs"
+        LOG.warning("%s: it drives, %s: %s.", source, on, WheelDrive(robot))
     if "ready" in keyframes:
         if keyframes["ready"] != keyframes.get("home") or feet_are_level(robot):
             return level_soles(robot, given, names.take)

@@ -5,7 +5,14 @@ the lowest plane; nothing moves on it but its rollers. It is driven, or belongs 
 caster. Words of names only decide what geometry leaves open.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Iterator,
+    Mapping,
+    Sequence,
+)
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -111,6 +118,11 @@ class WheeledBase:
         """Joints of wheels and of their steering."""
         own = [name for w in self.wheels for name in (w.joint, w.steering) if name]
         return tuple(dict.fromkeys(own))
+
+    def fields(self, actuators: Iterable[dict[str, Any]]) -> dict[str, Any]:
+        """Return wheels and all actuators, with those of other joints in the file."""
+        kept = [x for x in actuators if x["joint"] not in self.joints]
+        return {"wheels": self.wheels, "actuators": [*kept, *self.actuators]}
 
 
 def find_wheels(
