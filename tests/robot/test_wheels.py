@@ -8,6 +8,7 @@ import pytest
 from tests.robot import wheeled_urdfs as urdfs
 from wbc_suite import load_robot
 from wbc_suite.envs.drive_check import drive_check
+from wbc_suite.envs.hold_check import alone
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.wheel_drive import DriveKind, WheelDrive
 
@@ -40,6 +41,13 @@ def test_wheels_and_their_drive_are_found(name: str, tmp_path: Path) -> None:
     holonomic = kind in (DriveKind.MECANUM, DriveKind.OMNI)
     assert (robot.root.drive == "holonomic") is holonomic
     assert [*robot.groups] == ["wheels"]
+
+
+def test_the_name_of_a_mesh_tells_mecanum_wheels(tmp_path: Path) -> None:
+    mesh = '<visual><geometry><mesh filename="mecanum_a.stl"/></geometry></visual>'
+    head = '<link name="fl">'
+    robot = _loaded(urdfs.four("cart").replace(head, head + mesh), tmp_path)
+    assert WheelDrive(robot).kind is DriveKind.MECANUM
 
 
 @pytest.mark.parametrize("name", urdfs.NO_WHEELS)
@@ -115,8 +123,28 @@ def test_wheels_of_legs_are_no_joints_of_legs(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("root", ["planar", "free"])
-@pytest.mark.parametrize("name", [n for n in KINDS if n[:4] not in ("omni", "meca")])
+@pytest.mark.parametrize("name", [*KINDS, "legs"])
 def test_a_base_drives_2_m_and_turns(name: str, root: str, tmp_path: Path) -> None:
-    robot = _loaded(KINDS[name][0], tmp_path, root=root)
+    text = urdfs.quadruped() if name == "legs" else KINDS[name][0]
+    robot = _loaded(text, tmp_path, root=root)
     driven = drive_check(robot)
     assert driven.arrived, driven
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["omni of 3", "mecanum"])
+def test_rollers_carry_a_base_sideways(name: str, tmp_path: Path) -> None:
+    robot = _loaded(KINDS[name][0], tmp_path, root="free")
+    part = {"type": "BASE_VELOCITY", "input_type": "absolute"}
+    config = {"format": 1, "type": "BASIC", "body_parts": {"base": part}}
+    env = alone(robot, controller_configs=config, control_freq=20)
+    env.reset(seed=0)
+    for _ in range(60):
+        env.step(np.array([0.0, 0.2, 0.0]))
+    pose = env.simulation.robots[0].root_pose
+    env.close()
+    # 3 s at 0.2 m/s, less half of the ramp of 0.2 s; wheels creep by 2 to 3 %
+    np.testing.assert_allclose(pose.translation[:2], (0.0, 0.58), atol=0.04)
+    assert np.arctan2(pose.rotation[1, 0], pose.rotation[0, 0]) == pytest.approx(
+        0.0, abs=0.05
+    )

@@ -46,15 +46,19 @@ def demo(
 ) -> None:
     """Move a robot's hands along curves; print tracking errors, write pictures.
 
-    The robot is alone on the floor. Without hands, it moves its trunk or last link.
+    The robot is alone on the floor. Without hands, it moves its trunk or last link. One
+    on wheels also drives 2 m ahead, and turns by 90 degrees.
     """
     from PIL import Image
 
     from wbc_suite.atomic_files import check_folder, replace_file
     from wbc_suite.control import load_composite_controller_config
+    from wbc_suite.envs.drive_check import drive_check
     from wbc_suite.envs.hold_check import alone, hold_faults
     from wbc_suite.recording.video import write_video
     from wbc_suite.robot import load_robot
+    from wbc_suite.robot.wheel_drive import WheelDrive
+    from wbc_suite.viewers.offscreen import render_robot
 
     chosen = options.chosen(gripper)
     loaded = load_robot(
@@ -62,6 +66,14 @@ def demo(
     )
     config = load_composite_controller_config(controller, loaded)
     sizes = dict(_sizes(loaded, config))
+    if loaded.wheels:
+        print(f"{loaded.name}, {WheelDrive(loaded)}: {drive_check(loaded)}.")
+    check_folder(output)
+    if not sizes:
+        still = output / "drive.png"
+        replace_file(still, Image.fromarray(render_robot(loaded)).save)
+        print(f"Wrote {still}.")
+        return
     env = alone(loaded, controller_configs=config, control_freq=RATE)
     seconds = figures * PERIOD + REST
     errors, step_times, pictures = _reach(env, sizes, seconds)
@@ -69,7 +81,6 @@ def demo(
     for fault in hold_faults(loaded) if errors[-1].max() > LATE else ():
         print(f"  at `ready`: {fault}")
     still, film = output / "reach.png", output / "reach.gif"
-    check_folder(output)
     replace_file(still, Image.fromarray(pictures[len(pictures) // 4]).save)
     write_video(pictures, film, rate=FRAMES_PER_SECOND)
     print(f"Wrote {still} and {film}.")

@@ -17,6 +17,7 @@ QUARTER = np.pi / 2.0  # rad
 PACE = (0.3, 0.6)  # m/s and rad/s, of a careful driver
 RATE = 20  # Hz, of actions
 SLOW = 4.0  # times as long as at that pace, a drive has failed
+BRAKING = 0.5  # s of way before the end, from which on a driver slows down
 REST = 1.0  # s, standing still after each
 TILTED = 0.9  # least vertical component of the first link's z
 
@@ -85,6 +86,11 @@ def drive_check(robot: RobotDescription) -> Driven:
     )
 
 
+def _slower(way: float, speed: float) -> float:
+    """Return the part of a speed to go on with for a way, m or rad."""
+    return float(np.clip(way / (BRAKING * speed), 0.1, 1.0))
+
+
 class _Driver:
     """Commands a base, and measures where it is."""
 
@@ -103,9 +109,10 @@ class _Driver:
 
     def go(self, *, forward: float) -> None:
         """Drive ahead until the way is done."""
-        left = SLOW * AHEAD / forward
-        while left > 0.0 and np.linalg.norm(self.place() - self.start) < AHEAD:
-            self._step(forward, 0.0)
+        left, way = SLOW * AHEAD / forward, AHEAD
+        while left > 0.0 and way > 0.0:
+            self._step(forward * _slower(way, forward), 0.0)
+            way = AHEAD - float(np.linalg.norm(self.place() - self.start))
             left -= 1.0 / RATE
         self._rest()
 
@@ -116,7 +123,8 @@ class _Driver:
         rate = min(rate, forward / radius) if radius else rate
         left, last = SLOW * QUARTER / rate, self.yaw()
         while left > 0.0 and self.turned < QUARTER:
-            self._step(forward, rate)
+            part = _slower(QUARTER - self.turned, rate)
+            self._step(part * forward, part * rate)
             last = self._turn_from(last)
             left -= 1.0 / RATE
         self._rest()

@@ -76,6 +76,10 @@ def load_robot(
         robot = _import(path, skin, mesh_root=mesh_root, strict=strict)
     if root not in (None, robot.root.kind):
         robot = robot.with_root(root)
+    if robot.root.kind == "free" and robot.wheels:
+        from wbc_suite.robot.wheel_rollers import with_rollers
+
+        robot = with_rollers(robot)
     if path.suffix == ".toml" or robot.root.kind != "free":
         return robot
     return _standing(robot, path, asked=root == "free")

@@ -139,6 +139,7 @@ class _Importer:
             materials=self._shapes.colors,
             names=self._names,
             lines={self._links[b.name]: at_line(b.link) for b in kept},
+            meshes={self._links[b.name]: _mesh_names(b.link) for b in kept},
             strict=self._strict,
         )
 
@@ -323,6 +324,10 @@ def _fix(branch: Branch, joint: Element, value: float) -> None:
 def _is_bare(branch: Branch) -> bool:
     tags = ("inertial", "visual", "collision")
     return all(branch.link.find(tag) is None for tag in tags)
+
+
+def _mesh_names(link: Element) -> str:
+    return " ".join(mesh.get("filename", "") for mesh in link.iter("mesh"))
 
 
 def _refuse_roots(branches: list[Branch]) -> None:

@@ -227,7 +227,7 @@ def default_composite(
     if robot.root.kind == "free" and _walks(robot, catalogue or Catalogue()):
         return "WHOLE_BODY_ID"
     feet = any(frame.role == "foot" for frame in robot.frames)
-    if robot.root.kind == "free" and robot.wheels and not feet:
+    if robot.root.kind == "free" and robot.wheels:
         return "BASIC"
     if not robot.hands or feet:
         return "WHOLE_BODY_IK"

@@ -54,6 +54,7 @@ STATE = record_type(
     ("trunk_height", "f8"),  # of the trunk over the ground at the reset, m
     ("hand_frame", "i8"),  # 1: goals of hands are given in the heading frame
     ("tracks", "i8"),  # 1: the robot tracks a motion, see `Tracked`
+    ("glides", "i8"),  # 1: feet are wheels, which may move over the ground
     ("stiffness", "f8", (2,)),  # of its position and attitude, 1/s^2
     ("com_weight", "f8"),  # of the centre of mass that tracks
     ("root_weight", "f8", (2,)),  # of position and attitude of the root that tracks

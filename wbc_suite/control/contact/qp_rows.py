@@ -126,7 +126,12 @@ def _add_foot(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
     for i in range(count):
         wanted = -terms.drift[i]
         if stands:
-            wanted -= STANCE_FOOT[1] * terms.velocity[i]
+            if i < 2 and body.state[0].glides == 1:  # with the robot's other wheels
+                error = plan.position[k, i] - measured.foot[k, i]
+                rate = plan.velocity[k, i] - terms.velocity[i]
+                wanted += SWING_FOOT[2] * error + kd * rate
+            else:
+                wanted -= STANCE_FOOT[1] * terms.velocity[i]
             weight = STANCE_FOOT[0]
         elif i < 3:
             error = plan.position[k, i] - measured.foot[k, i]

@@ -95,6 +95,7 @@ def describe_import(
     frames: Sequence[dict[str, Any]],
     names: NameTable,
     lines: Mapping[str, str] | None = None,
+    meshes: Mapping[str, str] | None = None,
     strict: bool = False,
     **others: Any,
 ) -> RobotDescription:
@@ -104,6 +105,7 @@ def describe_import(
     Inertias that no body can have are replaced by the nearest possible ones with a
     warning, or refused if the import is `strict`. An implausible inertia is only a
     warning, since some meshes may not be read. Messages tell the `lines` of links.
+    Names of files of `meshes`, by link, may tell mecanum wheels.
 
     Raises:
         DescriptionError: If the robot is inconsistent, or unphysical and `strict`.
@@ -128,14 +130,13 @@ def describe_import(
         take=names.take,
         driven=driven,
         name=name,
+        meshes=meshes,
     )
     kinds, wheels = dict[str, str](), ()
     if wheeled is not None:
         checked, kinds, wheels = list(wheeled.links), wheeled.kinds, wheeled.joints
         root = wheeled.root or root
-        kept = [x for x in others.get("actuators", ()) if x["joint"] not in wheels]
-        others["actuators"] = [*kept, *wheeled.actuators]
-        others["wheels"] = wheeled.wheels
+        others |= wheeled.fields(others.get("actuators", ()))
     limbs = infer_limbs(checked, kinds)
     placed = infer_frames(checked, limbs, given, names.take)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
@@ -157,8 +158,8 @@ def describe_import(
     except ValueError as error:  # of MuJoCo's compiler
         raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
     if wheeled is not None:
-        kept = "the root is planar" if wheeled.root else "wheels are on legs"
-        LOG.warning("%s: it drives, and %s: %s.", source, kept, WheelDrive(robot))
+        on = "its root is planar" if wheeled.root else "on legs"
+        LOG.warning("%s: it drives, %s: %s.", source, on, WheelDrive(robot))
     if "ready" in keyframes:
         if keyframes["ready"] != keyframes.get("home") or feet_are_level(robot):
             return level_soles(robot, given, names.take)

@@ -5,7 +5,14 @@ the lowest plane; nothing moves on it but its rollers. It is driven, or belongs 
 caster. Words of names only decide what geometry leaves open.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Iterator,
+    Mapping,
+    Sequence,
+)
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -35,8 +42,8 @@ ROLLERS = 4  # fewer links that turn on one are no rollers
 SLANTED = (
     0.35  # rad; rollers of mecanum wheels are turned by more, mostly by 45 degrees
 )
-MECANUM = {"mecanum", "mechanum", "mecanumwheel", "swedish"}
-OMNI = {"omni", "omniwheel", "omnidirectional"}
+SIDEWAYS = {"mecanum", "mechanum", "swedish", "omni", "omnidirectional"}
+"""Words for four parallel wheels that drive sideways, so they are mecanum wheels."""
 CASTERS = {"caster", "castor", "casters", "castors", "idler", "rotacastor"}
 
 GRIP = 1.0
@@ -112,6 +119,11 @@ class WheeledBase:
         own = [name for w in self.wheels for name in (w.joint, w.steering) if name]
         return tuple(dict.fromkeys(own))
 
+    def fields(self, actuators: Iterable[dict[str, Any]]) -> dict[str, Any]:
+        """Return wheels and all actuators, with those of other joints in the file."""
+        kept = [x for x in actuators if x["joint"] not in self.joints]
+        return {"wheels": self.wheels, "actuators": [*kept, *self.actuators]}
+
 
 def find_wheels(
     links: Sequence[Link],
@@ -121,6 +133,7 @@ def find_wheels(
     take: Callable[[str, str], str],
     driven: Collection[str] = (),
     name: str = "",
+    meshes: Mapping[str, str] | None = None,
 ) -> WheeledBase | None:
     """Return the wheels that a robot drives on, or None.
 
@@ -131,8 +144,9 @@ def find_wheels(
         take: Returns a free name near the given one, for a kind of element.
         driven: Joints with an actuator that is not a motor with an effort.
         name: Name of the robot.
+        meshes: Names of the files of meshes, by link.
     """
-    return _Search(links, ready, root, take, driven, name).base()
+    return _Search(links, ready, root, take, driven, name, meshes or {}).base()
 
 
 @dataclass
@@ -143,6 +157,7 @@ class _Search:
     take: Callable[[str, str], str]
     driven: Collection[str]
     name: str
+    meshes: Mapping[str, str]
 
     def __post_init__(self) -> None:
         links = self.links
@@ -332,8 +347,9 @@ class _Search:
                 return None
             return [w._replace(roller=w.roller or 0.0) for w in wheels]
         words = {word for w in wheels for word in self._words(w)}
-        words |= set(words_of(self.name))
-        if len(wheels) == 4 and (MECANUM & words) and wheels[0].roller is None:
+        files = (self.meshes.get(w.link.name, "") for w in wheels)
+        words |= {word for text in (self.name, *files) for word in words_of(text)}
+        if len(wheels) == 4 and SIDEWAYS & words and wheels[0].roller is None:
             middle = np.mean([w.centre for w in wheels], axis=0)
             return [w._replace(roller=_slant(w, middle)) for w in wheels]
         if any(w.roller is not None and abs(w.roller) < SLANTED for w in wheels):
