@@ -114,9 +114,6 @@ def describe_import(
         where = f"{source}: link '{fields['name']}'"
         where += (lines or {}).get(fields["name"], "")
         checked.append(parse_model(Link, fields, source=where, error=DescriptionError))
-    checked = _with_masses(_filled(checked, source, strict), source, strict=strict)
-    checked = _physical(checked, source, strict=strict)
-    checked = _accept_implausible(checked, source)
     how: dict[str, Any] = {"source": str(source), "error": DescriptionError}
     roles = [x | {"role": infer_role(x["name"])} for x in frames]
     given = [parse_model(Frame, x, **how) for x in roles]
@@ -138,6 +135,10 @@ def describe_import(
         others["wheels"] = wheeled.wheels
     limbs = infer_limbs(checked, kinds)
     placed = infer_frames(checked, limbs, given, names.take)
+    checked = checked if strict else _filled(checked, placed, source)
+    checked = _with_masses(checked, source, strict=strict)
+    checked = _physical(checked, source, strict=strict)
+    checked = _accept_implausible(checked, source)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
     complete, deviations = _with_motors(checked, placed, actuated, limbs, source)
     keyframes = others.pop("keyframes", {})
@@ -255,13 +256,16 @@ def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
     return links
 
 
-def _filled(links: Sequence[Link], source: Path, strict: bool) -> Sequence[Link]:
-    """Estimate masses where most are missing, unless the import is `strict`."""
-    filled = links if strict else estimate_masses(links)
+def _filled(
+    links: Sequence[Link], frames: Sequence[Frame], source: Path
+) -> Sequence[Link]:
+    """Estimate masses where most are missing."""
+    filled = estimate_masses(links, frames)
     if filled != links:
         LOG.warning(
-            "%s: most links have no mass; mended: ellipsoids of 1000 kg/m^3 in their "
-            "bounding boxes, %.3g kg in all.",
+            "%s: most links have no mass; mended: %.3g kg in all, from the volumes of "
+            "their shapes and what the motors hold. Give each an <inertial> to have "
+            "others.",
             *(source, sum(link.mass for link in filled)),
         )
     return filled
@@ -316,7 +320,7 @@ def _physical(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link
     heads = [x for x in links if x.joint or x is links[0]]
     wrong = {x.name: fault for x in heads if (fault := gyration_fault(x))}
     faults |= wrong
-    links = [ellipsoid(x, x.mass) if x.name in wrong else x for x in links]
+    links = [ellipsoid(x) if x.name in wrong else x for x in links]
     shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
     if faults and strict:
         raise DescriptionError(
