@@ -256,9 +256,7 @@ def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
     return links
 
 
-def _filled(
-    links: Sequence[Link], frames: Sequence[Frame], source: Path
-) -> Sequence[Link]:
+def _filled(links: Sequence[Link], frames: Sequence[Frame], source: Path) -> list[Link]:
     """Estimate masses where most are missing."""
     filled = estimate_masses(links, frames)
     if filled != links:
