@@ -84,7 +84,7 @@ def _sizes(
     feet = any(frame.role == "foot" for frame in robot.frames)
     most = STANDING if feet and robot.root.kind == "free" else 1.0
     for frame in config["frame"]:
-        if frame.get("kind", "pose") != "pose":
+        if frame.get("kind", "pose") not in ("pose", "position"):
             continue
         length = arm_length(robot, frame["frame"])
         yield frame["name"], min(most, length / ARM) if length else ON_FEET
@@ -118,7 +118,8 @@ def _reach(
         for step in range(round(seconds * RATE)):
             offset = _figure(min(step / RATE, seconds - REST))
             goals = {
-                name: start[name] + np.pad(size * _mirrored(offset, name), (0, 3))
+                name: start[name]
+                + np.pad(size * _mirrored(offset, name), (0, len(start[name]) - 3))
                 for name, size in sizes.items()
             }
             action, begin = layout.pack(goals, base=env.hold_action), perf_counter()
