@@ -135,10 +135,7 @@ def describe_import(
         others["wheels"] = wheeled.wheels
     limbs = infer_limbs(checked, kinds)
     placed = infer_frames(checked, limbs, given, names.take)
-    checked = checked if strict else _filled(checked, placed, source)
-    checked = _with_masses(checked, source, strict=strict)
-    checked = _physical(checked, source, strict=strict)
-    checked = _accept_implausible(checked, source)
+    checked = _with_inertias(checked, placed, source, strict=strict)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
     complete, deviations = _with_motors(checked, placed, actuated, limbs, source)
     keyframes = others.pop("keyframes", {})
@@ -254,6 +251,15 @@ def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
                 "offset": own["offset"] + own["ratio"] * leader["offset"],
             }
     return links
+
+
+def _with_inertias(
+    links: list[Link], frames: Sequence[Frame], source: Path, *, strict: bool
+) -> list[Link]:
+    """Return links with masses and inertias that bodies can have."""
+    links = links if strict else _filled(links, frames, source)
+    links = _with_masses(links, source, strict=strict)
+    return _accept_implausible(_physical(links, source, strict=strict), source)
 
 
 def _filled(links: Sequence[Link], frames: Sequence[Frame], source: Path) -> list[Link]:
