@@ -404,14 +404,38 @@ def test_configs_are_refused_in_words():
         load("GR1FreeBody", foot=[{"frame": "left_foot", "sole": [1, 0, 0, 1]}] * 2)
 
 
-def test_a_biped_without_soles_is_refused_with_those_that_its_shapes_suggest():
+def test_a_biped_without_a_file_stands_on_the_soles_of_its_shapes(caplog):
     robot = load_robot("GR1FreeBody")
-    with pytest.raises(ConfigError, match="soles are not given") as raised:
-        default_dynamics_config(robot)
-    text = str(raised.value)
+    given = load_composite_controller_config("WHOLE_BODY_ID", robot)["foot"]
+    found = default_dynamics_config(robot)
+    assert [foot["frame"] for foot in found["foot"]] == ["left_foot", "right_foot"]
+    for own, foot in zip(found["foot"], given, strict=True):
+        np.testing.assert_allclose(own["sole"], foot["sole"], atol=0.02)
+    text = caplog.text
     config = tomllib.loads(text[text.index("format = 1") :])
     read = load_composite_controller_config(config, robot)
-    assert [foot["frame"] for foot in read["foot"]] == ["left_foot", "right_foot"]
+    for own, foot in zip(read["foot"], found["foot"], strict=True):
+        np.testing.assert_allclose(own["sole"], foot["sole"], atol=1e-3)
+
+
+def test_a_biped_whose_soles_are_unsure_is_refused_with_what_its_shapes_suggest():
+    robot = load_robot("GR1FreeBody")
+    frames = {frame.name: frame for frame in robot.frames}
+    x, y, z = frames["left_foot"].pos
+    frames["left_foot"] = frames["left_foot"].model_copy(update={"pos": (x + 1, y, z)})
+    moved = robot.model_copy(update={"frames": tuple(frames.values())})
+    with pytest.raises(ConfigError, match="m beside its sole") as raised:
+        default_dynamics_config(moved)
+    text = str(raised.value)
+    assert tomllib.loads(text[text.index("format = 1") :])["gait"]["type"] == "walk"
+    legs = [
+        link.model_copy(update={"collision": ()})
+        if link.name == robot.link_of("left_foot")
+        else link
+        for link in robot.links
+    ]
+    with pytest.raises(ConfigError, match="no area of its collision shapes"):
+        default_dynamics_config(robot.model_copy(update={"links": tuple(legs)}))
     without = robot.model_copy(update={"frames": ()})
     with pytest.raises(ConfigError, match="0 frames with the role 'foot'"):
         default_dynamics_config(without)

@@ -7,7 +7,15 @@ import pytest
 
 from wbc_suite.errors import DescriptionError
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.adopt.missing_data import DENSITY, GRAVITY, RESERVE, ROTOR
+from wbc_suite.robot.adopt.missing_data import (
+    DENSITY,
+    GRAVITY,
+    HEAVIEST_BASE,
+    LEAST,
+    RESERVE,
+    ROTOR,
+    STRETCHED,
+)
 
 BALL = '<geometry><sphere radius="0.1"/></geometry>'
 ARM = """<robot name="arm"><link name="base"/>
@@ -137,21 +145,57 @@ def test_an_arm_with_few_motors_gets_them_beside_a_driven_hand(tmp_path):
     assert [robot.joint(f"finger_{k}").effort for k in range(3)] == [1.0, 1.0, 1.0]
 
 
-def test_a_ball_without_mass_gets_that_of_its_volume(tmp_path, caplog):
-    text = f"""<robot name="ball"><link name="base"/><link name="ball">
-    <collision><origin xyz="0 0 0.5"/>{BALL}</collision></link>
-    <joint name="hinge" type="continuous"><parent link="base"/><child link="ball"/>
-    </joint></robot>"""
-    robot = read(tmp_path, text)
-    ball = robot.link("ball")
-    mass = DENSITY * 4.0 / 3.0 * np.pi * 0.1**3
-    assert ball.mass == pytest.approx(mass)
-    assert ball.com == pytest.approx((0.0, 0.0, 0.5))
-    assert ball.inertia == pytest.approx((0.4 * mass * 0.1**2,) * 3 + (0.0,) * 3)
-    assert robot.joints[0].effort == pytest.approx(
-        RESERVE * GRAVITY * mass / 2, abs=0.01
+ROUND = 0.03  # part of its volume that the mesh of a ball of 0.1 m lacks, at most
+SOLID = DENSITY * 4.0 / 3.0 * np.pi * 0.1**3
+
+
+def ball_on_a_hinge(folder, *, base="", limit="", visual=""):
+    collision = f'<collision><origin xyz="0 0 0.5"/>{BALL}</collision>'
+    return read(
+        folder,
+        f"""<robot name="ball"><link name="base">{base}</link><link name="ball">
+        {visual}{collision}</link>
+        <joint name="hinge" type="revolute"><parent link="base"/><child link="ball"/>
+        <limit lower="-1" upper="1" velocity="1" {limit}/></joint></robot>""",
     )
-    assert "most links have no mass; mended" in caplog.text
+
+
+def test_a_ball_without_mass_gets_that_of_its_volume(tmp_path, caplog):
+    robot = ball_on_a_hinge(tmp_path, limit='effort="0"')
+    ball = robot.link("ball")
+    assert ball.mass == pytest.approx(SOLID, rel=ROUND)
+    assert ball.com == pytest.approx((0.0, 0.0, 0.5))
+    assert ball.inertia[:3] == pytest.approx((0.4 * SOLID * 0.1**2,) * 3, rel=2 * ROUND)
+    assert robot.joints[0].effort == pytest.approx(
+        RESERVE * GRAVITY * ball.mass / 2, abs=0.01
+    )
+    assert f"mended: {robot.mass:.3g} kg in all" in caplog.text
+
+
+@pytest.mark.parametrize("share", [0.6, 0.01, 3.0])
+def test_missing_masses_are_what_motors_can_hold(tmp_path, share):
+    effort = share * STRETCHED * GRAVITY * SOLID * 0.5
+    robot = ball_on_a_hinge(tmp_path, limit=f'effort="{effort}"')
+    wanted = SOLID * min(max(share, LEAST), 1.0)
+    assert robot.mass == pytest.approx(wanted, rel=ROUND)
+
+
+def test_a_table_below_an_arm_is_no_block(tmp_path):
+    """A box of 1 x 2 x 1 m would have two tons."""
+    box = '<collision><geometry><box size="1 2 1"/></geometry></collision>'
+    robot = ball_on_a_hinge(tmp_path, base=box, limit='effort="100"')
+    ball, table = robot.link("ball"), robot.link("base")
+    assert table.mass == pytest.approx(HEAVIEST_BASE * ball.mass)
+    x, y, z = table.inertia[:3]
+    assert (x, y, z) == pytest.approx(
+        (table.mass / 12 * 5, table.mass / 12 * 2, table.mass / 12 * 5)
+    )
+
+
+def test_padded_collision_shapes_and_overlaps_have_no_mass(tmp_path):
+    visual = '<visual><geometry><box size="0.1 0.1 0.2"/></geometry></visual>'
+    robot = ball_on_a_hinge(tmp_path, limit='effort="100"', visual=2 * visual)
+    assert robot.mass == pytest.approx(DENSITY * 0.1 * 0.1 * 0.2)
 
 
 @pytest.mark.parametrize(

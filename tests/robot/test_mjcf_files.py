@@ -1,5 +1,7 @@
 """Names in MJCF lead to the files that MuJoCo opens, and never out of the folder."""
 
+from pathlib import Path
+
 import pytest
 
 from wbc_suite.errors import ConfigError, DescriptionError
@@ -148,8 +150,10 @@ def test_names_never_lead_out_of_the_folder(files, write, tmp_path, monkeypatch)
     (path.parent / "up").symlink_to(tmp_path, target_is_directory=True)
     (path.parent / "link.obj").symlink_to(tmp_path / "secret.obj")
     monkeypatch.setattr("mujoco.MjSpec.from_file", None)  # opens nothing
-    with pytest.raises(ConfigError, match="lies outside the folder"):
+    with pytest.raises(ConfigError, match="lies outside the folder") as raised:
         compile_mjcf(path)
+    wider = str(raised.value).partition("--mesh-root ")[2].removesuffix(".")
+    assert not wider or Path(wider) in (tmp_path, *tmp_path.parents)
 
 
 @pytest.mark.parametrize(

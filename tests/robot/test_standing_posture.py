@@ -171,3 +171,60 @@ def test_legs_on_wheels_stand_on_these(tmp_path):
     ready = robot.keyframes["ready"]
     assert robot.root.kind == "free"
     assert ready["FL_calf_joint"] < -0.9 < 0.0 == ready["FL_wheel_joint"]
+
+
+SOLE = np.array([(x, y, -0.06) for x in (-0.06, 0.14) for y in (-0.04, 0.04)])
+"""Lower corners of the box of a foot of `human` in the axes of its link."""
+
+
+@pytest.mark.parametrize("pitch", [0.2, -0.15])
+def test_soles_are_flat_where_the_file_has_tilted_feet(tmp_path, pitch):
+    """At zero the ankle of the file holds the foot pitched, as in Berkeley's Lite."""
+    text = human()
+    for side in ("left", "right"):
+        plain = joint(f"{side}_ankle", f"{side}_shin", f"{side}_foot", "0 0 -0.4")
+        assert plain in text
+        turned = plain.replace('xyz="0 0 -0.4"', f'xyz="0 0 -0.4" rpy="0 {pitch} 0"')
+        text = text.replace(plain, turned)
+    assert_flat(read(tmp_path, text))
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.5])
+def test_a_tilted_hip_bends_too_and_its_other_joints_keep_the_sole_flat(tmp_path, tilt):
+    """Unitree's H2 has the axis of its hips 30 degrees off."""
+    text = human()
+    for side, way in (("left", 1), ("right", -1)):
+        axis = f"0 {np.cos(tilt)} {way * np.sin(tilt)}"
+        plain = joint(f"{side}_hip", "pelvis", f"{side}_thigh", f"0 {way * 0.1} 0")
+        assert plain in text
+        parts = [
+            joint(f"{side}_hip", "pelvis", f"{side}_h1", f"0 {way * 0.1} 0", axis=axis),
+            link(f"{side}_h1", 0.5, '<sphere radius="0.03"/>'),
+            joint(f"{side}_roll", f"{side}_h1", f"{side}_h2", "0 0 0", axis="1 0 0"),
+            link(f"{side}_h2", 0.5, '<sphere radius="0.03"/>'),
+            joint(f"{side}_yaw", f"{side}_h2", f"{side}_thigh", "0 0 0", axis="0 0 1"),
+        ]
+        text = text.replace(plain, "".join(parts))
+    robot = read(tmp_path, text)
+    ready = robot.keyframe("ready")
+    for side in ("left", "right"):
+        assert abs(ready[f"{side}_knee"]) > 0.4
+        assert abs(ready[f"{side}_hip"]) > 0.2
+        if tilt == 0.0:
+            assert ready[f"{side}_roll"] == ready[f"{side}_yaw"] == 0.0
+    assert_flat(robot)
+
+
+def assert_flat(robot):
+    """Corners of the soles are level, below the hips, by Pinocchio."""
+    model = robot.to_pinocchio()
+    data = model.createData()
+    q = pin.neutral(model)
+    for name, value in robot.keyframe("ready").items():
+        q[model.joints[model.getJointId(name)].idx_q] = value
+    pin.framesForwardKinematics(model, data, q)
+    for side, y in (("left", 0.1), ("right", -0.1)):
+        foot = data.oMf[model.getFrameId(f"{side}_foot")]
+        heights = (SOLE @ foot.rotation.T)[:, 2]
+        assert np.ptp(heights) < 2e-3
+        np.testing.assert_allclose(foot.translation[:2], (0.0, y), atol=0.03)

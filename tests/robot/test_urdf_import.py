@@ -592,10 +592,13 @@ FAULTS = {
         "joint 'a' .*: <origin xyz=\"0 nan 0\"> must be 3 finite numbers",
     ),
     "no URDF": ("<mujoco/>", "begins with <robot>, not <mujoco>.* name it .xml"),
-    "xacro": ('<robot name="r"><xacro:include/></robot>', "expand it first"),
+    "xacro": (
+        '<robot name="r"><xacro:include/></robot>',
+        "or expand it first: xacro robot.urdf",
+    ),
     "xacro's value": (
         one_arm('<xacro:property/><link name="l0"><a b="${c}"/></link>'),
-        "expand it first",
+        "or expand it first: xacro robot.urdf",
     ),
     "entities": (
         '<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot>&a;</robot>',

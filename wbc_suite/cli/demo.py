@@ -24,6 +24,9 @@ POINTS = 90  # of a drawn figure
 REST = 1.0  # s, standing still at the end
 FRAMES_PER_SECOND = 10
 ARM = 0.6  # m; length of an arm that moves through the whole figure
+MEDIAN, MEDIAN_OF_FEW = 0.02, 0.04
+"""m; greatest median error in motion, and of hands whose arms have few joints."""
+SLOW = 3  # exit status of a robot that lags more
 LATE = 0.02  # m; error at rest from which on causes are looked for
 ON_FEET = 0.15  # of the figure, by what moves a robot without hands: its trunk
 STANDING = 0.5  # of the figure, by hands of a robot that stands on its feet
@@ -47,7 +50,9 @@ def demo(
     """Move a robot's hands along curves; print tracking errors, write pictures.
 
     The robot is alone on the floor. Without hands, it moves its trunk or last link. One
-    on wheels also drives 2 m ahead, and turns by 90 degrees.
+    on wheels also drives 2 m ahead, and turns by 90 degrees. The exit status is 3 if
+    the median error in motion is over 20 mm, or over 40 mm for a hand whose arm has
+    less than six joints.
     """
     from PIL import Image
 
@@ -84,6 +89,9 @@ def demo(
     replace_file(still, Image.fromarray(pictures[len(pictures) // 4]).save)
     write_video(pictures, film, rate=FRAMES_PER_SECOND)
     print(f"Wrote {still} and {film}.")
+    if slow := [*_slow(loaded, config, sizes, errors)]:
+        print(f"Behind by more than a hand should be: {', '.join(slow)}.")
+        raise typer.Exit(SLOW)
 
 
 def _sizes(
@@ -95,10 +103,29 @@ def _sizes(
     feet = any(frame.role == "foot" for frame in robot.frames)
     most = STANDING if feet and robot.root.kind == "free" else 1.0
     for frame in config["frame"]:
-        if frame.get("kind", "pose") != "pose":
+        if frame.get("kind", "pose") not in ("pose", "position"):
             continue
         length = arm_length(robot, frame["frame"])
         yield frame["name"], min(most, length / ARM) if length else ON_FEET
+
+
+def _slow(
+    robot: "RobotDescription",
+    config: dict[str, Any],
+    names: "Iterable[str]",
+    errors: "Matrix",
+) -> Iterator[str]:
+    """Yield each frame whose median error in motion is too large, with its bound."""
+    import numpy as np
+
+    from wbc_suite.robot.arms import has_few_joints
+
+    frames = {frame["name"]: frame.get("frame") for frame in config["frame"]}
+    medians = np.median(errors[: -round(REST * RATE)], axis=0)
+    for name, median in zip(names, medians.tolist(), strict=True):
+        most = MEDIAN_OF_FEW if has_few_joints(robot, frames[name]) else MEDIAN
+        if median > most:
+            yield f"{name} {1e3 * median:.0f} mm (at most {1e3 * most:.0f})"
 
 
 def _reach(
@@ -129,7 +156,8 @@ def _reach(
         for step in range(round(seconds * RATE)):
             offset = _figure(min(step / RATE, seconds - REST))
             goals = {
-                name: start[name] + np.pad(size * _mirrored(offset, name), (0, 3))
+                name: start[name]
+                + np.pad(size * _mirrored(offset, name), (0, len(start[name]) - 3))
                 for name, size in sizes.items()
             }
             action, begin = layout.pack(goals, base=env.hold_action), perf_counter()

@@ -15,6 +15,7 @@ from wbc_suite.typing import RobotName
 
 LOG = logs.logger(__name__)
 
+URDF = (".urdf", ".xacro")
 FOLDERS = ("gripper", "base", "arm", "body")
 
 
@@ -33,7 +34,8 @@ def load_robot(
 
     Args:
         name: Catalogue name, ignoring case (`Panda`, `gr1`), a component with its
-            folder (`gripper/panda_gripper`), or a path to a .toml, .urdf or .xml.
+            folder (`gripper/panda_gripper`), or a path to a .toml, .urdf, .xacro or
+            .xml.
         gripper: Another gripper for every side, or one per side: `{"right": ...}`;
             "none" leaves it out and puts `tcp` at the flange. `InspireHand` stands for
             the hand of each side. A name that ends in .toml is a file.
@@ -99,7 +101,7 @@ def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescr
     try:
         return with_soles(robot)
     except DescriptionError as error:
-        if asked or path.suffix.lower() != ".urdf":
+        if asked or path.suffix.lower() not in URDF:
             raise
         LOG.warning("%s Its root is made fixed.", error)
         return robot.with_root("fixed")
@@ -107,7 +109,7 @@ def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescr
 
 def _locate(name: str, catalogue: Catalogue) -> Path:
     path = Path(name)
-    if path.suffix.lower() in (".toml", ".urdf", ".xml", ".mjcf"):
+    if path.suffix.lower() in (".toml", *URDF, ".xml", ".mjcf"):
         if not path.is_file():
             raise ConfigError(f"{path}: the file does not exist.")
         return path
@@ -150,7 +152,7 @@ def _import(
     strict: bool,
 ) -> RobotDescription:
     drawn = skin != PLAIN
-    if path.suffix.lower() == ".urdf":
+    if path.suffix.lower() in URDF:
         from wbc_suite.robot.urdf_import import read_urdf as read
     else:
         from wbc_suite.robot.mjcf_import import read_mjcf as read

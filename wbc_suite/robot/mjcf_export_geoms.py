@@ -190,12 +190,13 @@ def _merged(shapes: tuple[Drawn, ...]) -> tuple[TriangleMesh, Indices]:
 
     Equal links share the result.
     """
-    meshes = [_triangles(shape) for shape in shapes]
+    meshes = [triangles_of(shape) for shape in shapes]
     counts = [len(mesh.vertices) for mesh in meshes]
     return merge(meshes), np.repeat(np.arange(len(meshes)), counts)
 
 
-def _triangles(shape: Drawn) -> TriangleMesh:
+def triangles_of(shape: Drawn) -> TriangleMesh:
+    """Return the surface of a shape in the axes of its link."""
     pose, mesh = Posed(pos=shape.pos, quat=shape.quat), mesh_of(shape)
     if mesh is not None:
         triangles = creased(TriangleMesh(*mesh))

@@ -10,12 +10,13 @@ import pinocchio as pin
 
 from wbc_suite import logs
 from wbc_suite.errors import ConfigError, DescriptionError, did_you_mean, join_first
-from wbc_suite.robot.xml_files import Element, at_line, read_xml
+from wbc_suite.robot.xacro_files import XACRO, expand_xacro
+from wbc_suite.robot.xml_files import Element, at_line, parse_xml, read_xml
 from wbc_suite.typing import Vector
 
 LOG = logs.logger(__name__)
 
-XACRO = "xacro:"
+PREFIX = "xacro:"
 MAX_LINKS = 500  # largest number of links, as in robot files
 
 
@@ -62,7 +63,10 @@ def read_tree(path: Path) -> tuple[Element, tuple[Branch, ...]]:
         ConfigError: If it is not URDF.
         DescriptionError: If its links and joints do not form a tree.
     """
-    robot = read_xml(path)
+    if path.suffix.lower() == XACRO:
+        robot = parse_xml(expand_xacro(path), source=str(path))
+    else:
+        robot = read_xml(path)
     _check_root(robot, path)
     links = _by_name(robot, "link", path)
     joints = _by_name(robot, "joint", path)
@@ -88,13 +92,14 @@ def read_tree(path: Path) -> tuple[Element, tuple[Branch, ...]]:
 
 
 def _check_root(robot: Element, path: Path) -> None:
-    templates = {x.tag for x in robot.iter() if x.tag.startswith(XACRO)}
+    templates = {x.tag for x in robot.iter() if x.tag.startswith(PREFIX)}
     parts = [*robot.findall("link"), *robot.findall("joint")]
     inside = (x for part in parts for x in part.iter())
     if templates and (not parts or any(map(_is_template, inside))):
         raise ConfigError(
-            f"{path}: this is a xacro file, a template of a URDF; expand it first "
-            "('xacro FILE > robot.urdf')."
+            f"{path}: this is a xacro file, a template of a URDF. Name it "
+            f"{path.stem}.xacro, to expand it here, or expand it first: "
+            f"xacro {path.name} > robot.urdf"
         )
     if templates:
         shown = join_first(sorted(templates))
@@ -108,7 +113,9 @@ def _check_root(robot: Element, path: Path) -> None:
 
 def _is_template(element: Element) -> bool:
     values = element.attrib.values()
-    return element.tag.startswith(XACRO) or any(re.search(r"\$[{(]", x) for x in values)
+    return element.tag.startswith(PREFIX) or any(
+        re.search(r"\$[{(]", x) for x in values
+    )
 
 
 def _by_name(robot: Element, tag: str, path: Path) -> dict[str, Element]:

@@ -202,9 +202,10 @@ def inside(root: Path, path: Path, *, source: Path) -> Path:
     """Return a path with resolved links; raises ConfigError outside of a folder."""
     resolved, root = real_path(path), real_path(root)
     if not resolved.is_relative_to(root):
+        common = Path(os.path.commonpath([root, resolved]))
+        wider = f", or allow both by --mesh-root {common}" * bool(common.name)
         raise ConfigError(
-            f"{source}: the file '{path}' lies outside the folder {root} and "
-            "is not read. Copy it into that folder, or give a folder that encloses "
-            "both by --mesh-root."
+            f"{source}: the file '{resolved}' lies outside the folder {root} and is "
+            f"not read. Copy it into that folder{wider}."
         )
     return resolved

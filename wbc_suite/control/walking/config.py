@@ -1,6 +1,6 @@
 """Config of WHOLE_BODY_ID: `controllers/{robot}_whole_body_id.toml`."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from pydantic import (
     model_validator,
 )
 
+from wbc_suite import logs
 from wbc_suite.config_files import FrozenModel, located, parse_model
 from wbc_suite.control.contact.state_source import StateSourceConfig
 from wbc_suite.control.ik.config import (
@@ -22,12 +23,14 @@ from wbc_suite.control.ik.config import (
 )
 from wbc_suite.control.ik.frame_kinds import ControlledFrame, GoalsConfig
 from wbc_suite.errors import ConfigError, UnknownNameError
-from wbc_suite.locomotion import GAITS, GaitConfig, TrotConfig
+from wbc_suite.locomotion import GAITS, GaitConfig, TrotConfig, WalkConfig
 from wbc_suite.robot import RobotDescription
-from wbc_suite.robot.adopt.soles import ball_radius, guess_sole
+from wbc_suite.robot.adopt.soles import ball_radius, guess_sole, sole_fault
 from wbc_suite.robot.arms import has_few_joints
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.shapes import Interval
+
+LOG = logs.logger(__name__)
 
 NOISY_CUTOFF = 25.0
 """Hz; GR1 walks with a delay of 20 ms and noise of 0.05 rad/s at it, not at 40 Hz."""
@@ -146,11 +149,12 @@ class WholeBodyIDConfig(GoalsConfig):
 
 
 def default_dynamics_config(robot: RobotDescription) -> dict[str, Any]:
-    """Return a config for a robot without a file: four feet trot.
+    """Return a config for a robot without a file: four feet trot, two walk.
+
+    The soles of a biped are those of its collision shapes.
 
     Raises:
-        ConfigError: If a robot with a free root has no four feet; soles of a biped are
-            not known.
+        ConfigError: If a robot with a free root has no two feet, or a biped no soles.
     """
     hands = [
         {"name": x["name"], "frame": x["frame"]}
@@ -170,11 +174,7 @@ def default_dynamics_config(robot: RobotDescription) -> dict[str, Any]:
             "in a controller file with [[foot]]; see docs/locomotion.md."
         )
     if len(feet) == 2:
-        raise ConfigError(
-            f"{robot.name} has two feet, and their soles are not given: it would tip "
-            "over. Write a controller file with [[foot]] for the left and right one. "
-            f"See docs/locomotion.md.{_suggested(robot, feet)}"
-        )
+        return {"format": 1, "frame": hands, **_on_soles(robot, feet)}
     return {
         "format": 1,
         "frame": hands,
@@ -198,21 +198,46 @@ def _check_root(
         )
 
 
-def _suggested(robot: RobotDescription, feet: list[str]) -> str:
-    """Return a file with the soles that the collision shapes have; empty if none."""
-    tables = []
-    for name in sorted(feet, key=lambda name: "left" not in name.lower()):
-        sole = guess_sole(robot, name)
-        if sole is None:
-            return ""
-        edges = ", ".join(f"{edge:.3f}" for edge in sole.edges)
-        tables.append(
-            f'[[foot]]\nframe = "{name}"\nsole = [{edges}]\nheight = {sole.height:.3f}'
+def _on_soles(robot: RobotDescription, feet: list[str]) -> dict[str, Any]:
+    """Return feet, gait and trunk of a biped, with the soles of its collision shapes.
+
+    Raises:
+        ConfigError: If these are no pair of soles.
+    """
+    left_first = sorted(feet, key=lambda name: "left" not in name.lower())
+    soles = [guess_sole(robot, name) for name in left_first]
+    tables = [
+        {"frame": name, "sole": [*sole.edges], "height": sole.height}
+        for name, sole in zip(left_first, soles, strict=True)
+        if sole is not None
+    ]
+    file = _as_file(tables, robot.links[0].name) if len(tables) == len(feet) else ""
+    if fault := sole_fault(*soles):
+        raise ConfigError(
+            f"{robot.name} has two feet, and {fault}: it could tip over. Write a "
+            "controller file with [[foot]] for the left and right one; see "
+            "docs/locomotion.md." + f" Its shapes suggest:\n\n{file}" * bool(file)
         )
-    trunk = f'[gait]\ntype = "walk"\n\n[[upright]]\nframe = "{robot.links[0].name}"'
-    head = 'format = 1\ntype = "WHOLE_BODY_ID"'
-    file = "\n\n".join([head, *tables, trunk])
-    return f" Its collision shapes suggest:\n\n{file}\n"
+    LOG.warning(
+        "%s: stands on the soles that its collision shapes have; to change them, write "
+        "a controller file:\n\n%s",
+        *(robot.name, file),
+    )
+    gait, trunk = WalkConfig().model_dump(), {"frame": robot.links[0].name}
+    return {"foot": tables, "gait": gait, "upright": [trunk]}
+
+
+def _as_file(feet: Sequence[Mapping[str, Any]], trunk: str) -> str:
+    """Return the text of a controller file with two feet."""
+    parts = ['format = 1\ntype = "WHOLE_BODY_ID"']
+    for foot in feet:
+        edges = ", ".join(f"{edge:.3f}" for edge in foot["sole"])
+        parts.append(
+            f'[[foot]]\nframe = "{foot["frame"]}"\nsole = [{edges}]\n'
+            f"height = {foot['height']:.3f}"
+        )
+    parts += ['[gait]\ntype = "walk"', f'[[upright]]\nframe = "{trunk}"']
+    return "\n\n".join(parts) + "\n"
 
 
 def read_dynamics(

@@ -116,9 +116,6 @@ def describe_import(
         where = f"{source}: link '{fields['name']}'"
         where += (lines or {}).get(fields["name"], "")
         checked.append(parse_model(Link, fields, source=where, error=DescriptionError))
-    checked = _with_masses(_filled(checked, source, strict), source, strict=strict)
-    checked = _physical(checked, source, strict=strict)
-    checked = _accept_implausible(checked, source)
     how: dict[str, Any] = {"source": str(source), "error": DescriptionError}
     roles = [x | {"role": infer_role(x["name"])} for x in frames]
     given = [parse_model(Frame, x, **how) for x in roles]
@@ -139,6 +136,7 @@ def describe_import(
         others |= wheeled.fields(others.get("actuators", ()))
     limbs = infer_limbs(checked, kinds)
     placed = infer_frames(checked, limbs, given, names.take)
+    checked = _with_inertias(checked, placed, source, strict=strict)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
     complete, deviations = _with_motors(checked, placed, actuated, limbs, source)
     keyframes = others.pop("keyframes", {})
@@ -256,13 +254,23 @@ def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
     return links
 
 
-def _filled(links: Sequence[Link], source: Path, strict: bool) -> Sequence[Link]:
-    """Estimate masses where most are missing, unless the import is `strict`."""
-    filled = links if strict else estimate_masses(links)
+def _with_inertias(
+    links: list[Link], frames: Sequence[Frame], source: Path, *, strict: bool
+) -> list[Link]:
+    """Return links with masses and inertias that bodies can have."""
+    links = links if strict else _filled(links, frames, source)
+    links = _with_masses(links, source, strict=strict)
+    return _accept_implausible(_physical(links, source, strict=strict), source)
+
+
+def _filled(links: Sequence[Link], frames: Sequence[Frame], source: Path) -> list[Link]:
+    """Estimate masses where most are missing."""
+    filled = estimate_masses(links, frames)
     if filled != links:
         LOG.warning(
-            "%s: most links have no mass; mended: ellipsoids of 1000 kg/m^3 in their "
-            "bounding boxes, %.3g kg in all.",
+            "%s: most links have no mass; mended: %.3g kg in all, from the volumes of "
+            "their shapes and what the motors hold. Give each an <inertial> to have "
+            "others.",
             *(source, sum(link.mass for link in filled)),
         )
     return filled
@@ -317,7 +325,7 @@ def _physical(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link
     heads = [x for x in links if x.joint or x is links[0]]
     wrong = {x.name: fault for x in heads if (fault := gyration_fault(x))}
     faults |= wrong
-    links = [ellipsoid(x, x.mass) if x.name in wrong else x for x in links]
+    links = [ellipsoid(x) if x.name in wrong else x for x in links]
     shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
     if faults and strict:
         raise DescriptionError(

@@ -6,19 +6,21 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.robot.adopt.foot_shapes import foot_spheres
 from wbc_suite.robot.adopt.posed_robot import PosedRobot
 from wbc_suite.robot.adopt.standing_posture import AT_FRAME, wheel_axis
-from wbc_suite.robot.collision_capsules import collision_spheres
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.elements import Frame, rigid_bodies
-from wbc_suite.robot.poses import pose_fields, poses_in_rigid_bodies, se3_of
-from wbc_suite.typing import Matrix
+from wbc_suite.robot.elements import Frame
+from wbc_suite.robot.poses import pose_fields, se3_of
 
 FLAT = 0.004
 """m; what lies at most so much higher than the lowest point belongs to the sole."""
 
 UPRIGHT_COSINE, AHEAD_COSINE = 0.98, 0.7
 """Least cosines of z to up and of x to ahead of a sole that is taken as given."""
+LEAST_SOLE, BESIDE = 0.025, 0.02
+"""m; least length and width of a sole, and greatest distance of a foot's frame beside
+it: NAO's is 40 mm narrow where it is narrowest, H2's ankle at the edge of its sole."""
 BIPED = 2  # feet at most; those of others are points
 
 
@@ -36,7 +38,7 @@ class Sole(NamedTuple):
 
 def guess_sole(robot: RobotDescription, frame: str) -> Sole | None:
     """Return the rectangle of the lowest collision points; None without an area."""
-    spheres = _spheres(robot, frame)
+    spheres = foot_spheres(robot, frame)
     bottom = spheres[:, 2] - spheres[:, 3]
     if not len(spheres):
         return None
@@ -48,12 +50,32 @@ def guess_sole(robot: RobotDescription, frame: str) -> Sole | None:
     return Sole(edges, -float(bottom.min()))
 
 
+def sole_fault(left: Sole | None, right: Sole | None) -> str:
+    """Return why two rectangles are no soles to stand on; empty if they are.
+
+    Soles have a length and width, about the same below both feet, and the ankles are
+    above them.
+    """
+    if left is None or right is None:
+        return "no area of its collision shapes lies below one of them"
+    for heel, toes, outer, inner in (left.edges, right.edges):
+        if toes - heel < LEAST_SOLE or inner - outer < LEAST_SOLE:
+            return f"a sole of {toes - heel:.3f} by {inner - outer:.3f} m is narrow"
+        beside = max(heel, outer, -toes, -inner)
+        if beside > BESIDE:
+            return f"one is {beside:.3f} m beside its sole"
+    sizes = [np.diff(np.reshape(x.edges, (2, 2))).ravel() for x in (left, right)]
+    if np.abs(sizes[0] - sizes[1]).max() > 0.1 * np.max(sizes):
+        return "their soles differ in size"
+    return ""
+
+
 def ball_radius(robot: RobotDescription, frame: str) -> float:
     """Return the radius of a foot that rolls about its frame, m; 0 for others.
 
     It is a ball, or a wheel on a hinge without limits through the frame.
     """
-    spheres, axis = _spheres(robot, frame), wheel_axis(robot, frame)
+    spheres, axis = foot_spheres(robot, frame), wheel_axis(robot, frame)
     if axis is not None and len(spheres):
         across = np.cross(se3_of(robot.frame(frame)).rotation.T @ axis, spheres[:, :3])
         return float((np.linalg.norm(across, axis=1) + spheres[:, 3]).max())
@@ -89,17 +111,3 @@ def level_soles(
             name = take(f"{name}_sole", "frame")
         frames[name] = frame.model_copy(update={"name": name, **fields})
     return robot.model_copy(update={"frames": tuple(frames.values())})
-
-
-def _spheres(robot: RobotDescription, name: str) -> Matrix:
-    """Return the spheres of a foot's rigid body in the axes of its frame, (n, 4)."""
-    frame = robot.frame(name)
-    bodies, poses = rigid_bodies(robot.links), poses_in_rigid_bodies(robot.links)
-    rows: list[Matrix] = [np.zeros((0, 4))]
-    to_frame = (poses[frame.link] * se3_of(frame)).inverse()
-    for link, found in collision_spheres(robot).items():
-        if bodies[link] == bodies[frame.link]:
-            pose = to_frame * poses[link]
-            centres = found[:, :3] @ pose.rotation.T + pose.translation
-            rows.append(np.column_stack([centres, found[:, 3]]))
-    return np.concatenate(rows)
