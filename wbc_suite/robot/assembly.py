@@ -185,7 +185,14 @@ class _Builder:
                 kind=folder or "component",
                 side=part.side,
             )
-        component = read_robot_file(path, self._catalogue)
+        if path in self._read:
+            return self._read[path]
+        if path.suffix == ".toml":
+            component = read_robot_file(path, self._catalogue)
+        else:
+            from wbc_suite.robot.adopt.hand_file import read_hand
+
+            component = read_hand(path)
         if not isinstance(component, Component):
             raise DescriptionError(f"{path}: a part must be a component.")
         self._read[path] = component
@@ -194,6 +201,7 @@ class _Builder:
     def _prefix(self, part: Part, component: Component, *, shared: bool) -> str:
         """Return the prefix that makes the names of links and joints unique."""
         taken = {name for link in self._links for name in _names(link)}
+        taken |= {frame.name for frame in self._fields["frames"]}
         own = [name for link in component.links for name in _names(link)]
         side = f"{part.side or part.name}_"
         plain = not (shared if part.rename is None else part.rename)

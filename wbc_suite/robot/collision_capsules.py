@@ -182,8 +182,10 @@ def _face_planes(points: Matrix, faces: Indices) -> Matrix:
     """Return outward normals n and offsets d of faces, n x + d = 0, shape (m, 4)."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.column_stack([normals, -np.einsum("ij,ij->i", normals, a)])
+    sizes = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.divide(normals, sizes, out=np.zeros_like(normals), where=sizes > 0.0)
+    planes = np.column_stack([normals, -np.einsum("ij,ij->i", normals, a)])
+    return planes[sizes[:, 0] > 0.0]
 
 
 def _pieces(points: Matrix, planes: Matrix, cuts: int) -> tuple[float, list[Segment]]:

@@ -38,7 +38,8 @@ def load_robot(
             .xml.
         gripper: Another gripper for every side, or one per side: `{"right": ...}`;
             "none" leaves it out and puts `tcp` at the flange. `InspireHand` stands for
-            the hand of each side. A name that ends in .toml is a file.
+            the hand of each side. A name that ends in .toml, .urdf or .xml is a file;
+            the last two are those of a hand alone.
         base: Another base with its own root and height; "none" leaves it out. A robot
             with legs or wheels accepts only a base without body (`NullMobileBase`).
         root: Another root: `fixed`, `planar` or `free`. A URDF that does not connect

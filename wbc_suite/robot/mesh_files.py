@@ -84,6 +84,21 @@ def read_points(path: Path) -> Matrix:
     return np.unique(points, axis=0)
 
 
+def read_triangles(path: Path) -> tuple[Matrix, Indices]:
+    """Read vertices (n, 3) and triangles (m, 3) of a mesh file, m; none if it has none.
+
+    Raises:
+        DescriptionError: If it is not a mesh.
+    """
+    data = read_bytes(path, most=MAX_BYTES, error=DescriptionError)
+    try:
+        mesh = load_mesh(path, data)
+        faces = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), np.int64)
+        return np.asarray(mesh.vertices, np.float64) * unit_of(mesh), faces
+    except Exception as error:  # trimesh raises anything for a malformed file
+        raise DescriptionError(f"{path}: not a readable mesh: {error}.") from error
+
+
 def _trimesh() -> Any:
     """Import trimesh, which takes 0.3 s and has no types."""
     return importlib.import_module("trimesh")

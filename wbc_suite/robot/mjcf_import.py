@@ -155,6 +155,7 @@ class _Importer:
             frames=frames,
             names=self._names,
             strict=self._strict,
+            slabs=self._slabs,
             keyframes=keyframes,
             cameras=list(self._cameras()),
             sensors=list(self._sensors()),
@@ -294,6 +295,15 @@ class _Importer:
         self._offsets[b] = -origin
         body["gravcomp"] = float(m.body_gravcomp[b])
         yield body | self._inertia(b) | read_shapes(m, b, -origin)
+
+    def _slabs(self, link: str) -> list[dict[str, Any]]:
+        """Return the collision shapes of a link, or else visual ones, cut to slabs."""
+        bodies = {name: b for b, name in self._bodies.items()}
+        b = bodies.get(link, 0)
+        if not b:
+            return []
+        found = read_shapes(self._m, b, self._offsets[b], cut=True)
+        return found["collision"] or found["visual"]
 
     def _steps(self, j: int) -> Iterator[_Step]:
         if j in self._balls:

@@ -14,8 +14,9 @@ from wbc_suite.robot.adopt.importing import NameTable
 from wbc_suite.robot.poses import pose_at, pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.robot.shapes import Drawn
+from wbc_suite.robot.slab_hulls import slab_hulls
 from wbc_suite.robot.surfaces import surfaces_of_triangles, texels
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
 LOG = logs.logger(__name__)
 
@@ -30,24 +31,26 @@ DEFAULTS = {"friction": (1.0, 0.005, 0.0001), "solref": (0.02, 1.0)}
 
 
 def read_shapes(
-    m: mujoco.MjModel, body: int, offset: Vector
+    m: mujoco.MjModel, body: int, offset: Vector, *, cut: bool = False
 ) -> dict[str, list[dict[str, Any]]]:
     """Return the visual and the collision shapes of a body, placed in its link.
 
-    The offset is the origin of the body in the link's frame, m.
+    The offset is the origin of the body in the link's frame, m. Meshes to `cut` become
+    hulls of slabs.
     """
     visual: list[dict[str, Any]] = []
     collision: list[dict[str, Any]] = []
     drawn = _drawn_geoms(m, body)
     for g in _geoms(m, body):
-        shape = _shape(m, g)
-        own = pin.SE3(np.eye(3), np.asarray(shape.pop("pos", np.zeros(3))))
-        pose = pose_at(m.geom_pos[g] + offset, m.geom_quat[g]) * own
-        shape |= pose_fields(pose)
-        if g in drawn:
-            visual.append(shape | {"color": _color(m, g)})
-        if m.geom_contype[g] or m.geom_conaffinity[g]:
-            collision.append(shape | _contact(m, g))
+        is_mesh = m.geom_type[g] == GEOM.mjGEOM_MESH
+        for shape in _cut(m, g) if cut and is_mesh else [_shape(m, g)]:
+            own = pin.SE3(np.eye(3), np.asarray(shape.pop("pos", np.zeros(3))))
+            pose = pose_at(m.geom_pos[g] + offset, m.geom_quat[g]) * own
+            placed = shape | pose_fields(pose)
+            if g in drawn:
+                visual.append(placed | {"color": _color(m, g)})
+            if m.geom_contype[g] or m.geom_conaffinity[g]:
+                collision.append(placed | _contact(m, g))
     return {"visual": visual, "collision": collision}
 
 
@@ -144,10 +147,19 @@ def _shape(m: mujoco.MjModel, g: int) -> dict[str, Any]:
                 "radius": size[0],
             }
         case _:
-            mesh = m.geom_dataid[g]
-            first, count = m.mesh_vertadr[mesh], m.mesh_vertnum[mesh]
-            points = np.array(m.mesh_vert[first : first + count], dtype=np.float64)
-            return fit_hull(points)
+            return fit_hull(_vertices(m, int(m.geom_dataid[g])))
+
+
+def _vertices(m: mujoco.MjModel, mesh: int) -> Matrix:
+    first, count = m.mesh_vertadr[mesh], m.mesh_vertnum[mesh]
+    return np.array(m.mesh_vert[first : first + count], dtype=np.float64)
+
+
+def _cut(m: mujoco.MjModel, g: int) -> list[dict[str, Any]]:
+    mesh = int(m.geom_dataid[g])
+    first, count = m.mesh_faceadr[mesh], m.mesh_facenum[mesh]
+    faces = np.array(m.mesh_face[first : first + count], dtype=np.int64)
+    return slab_hulls(_vertices(m, mesh), faces)
 
 
 def _color(m: mujoco.MjModel, g: int) -> list[float]:

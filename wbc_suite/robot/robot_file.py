@@ -199,7 +199,7 @@ def _located(part: Part, folder: Path) -> Part:
 
 def is_path(name: str) -> bool:
     """Whether a component is given by a file and not by its catalogue name."""
-    return name.endswith(".toml")
+    return name.lower().endswith((".toml", ".urdf", ".xml", ".mjcf"))
 
 
 RPY: dict[str, Any] = {

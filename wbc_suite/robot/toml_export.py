@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from typing import Any, TypeAlias, cast
+from typing import Any, Literal, TypeAlias, cast
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Elements
@@ -18,16 +18,22 @@ def write_toml(robot: RobotDescription) -> str:
     An assembly is written as one robot. Values that equal a default are omitted.
     Numbers keep all digits, so reading the text gives an equal robot.
     """
-    data: dict[str, Any] = {key: getattr(robot, key) for key in Elements.model_fields}
-    data["synergies"] = tuple(s for own in robot.synergies.values() for s in own)
-    component = Component(
-        format=1,
-        component=Header(kind="body", **{key: getattr(robot, key) for key in SOURCES}),
-        **data,
-    )
-    fields = component.model_dump(by_alias=True, exclude_defaults=True)
+    fields = as_component(robot).model_dump(by_alias=True, exclude_defaults=True)
     head = {key: fields.pop(key) for key in ("format", "component")}
     return toml_text(head | fields)
+
+
+def as_component(
+    robot: RobotDescription, kind: Literal["body", "gripper"] = "body"
+) -> Component:
+    """Return a robot as one component."""
+    data: dict[str, Any] = {key: getattr(robot, key) for key in Elements.model_fields}
+    data["synergies"] = tuple(s for own in robot.synergies.values() for s in own)
+    return Component(
+        format=1,
+        component=Header(kind=kind, **{key: getattr(robot, key) for key in SOURCES}),
+        **data,
+    )
 
 
 def toml_text(fields: "Table") -> str:

@@ -130,6 +130,7 @@ class _Importer:
         links = [self._link(branch, first=branch is kept[0]) for branch in kept]
         for text, joints in self._ranges.items():
             LOG.warning("%s: %s: %s.", path, text, join_first(joints, limit=12))
+        elements = {self._links[branch.name]: branch.link for branch in kept}
         return describe_import(
             name=name,
             source=path,
@@ -141,6 +142,7 @@ class _Importer:
             lines={self._links[b.name]: at_line(b.link) for b in kept},
             meshes={self._links[b.name]: _mesh_names(b.link) for b in kept},
             strict=self._strict,
+            slabs=lambda name: self._shapes.slabs(elements[name]),
         )
 
     def skins(self) -> dict[str, tuple[Drawn, ...]]:

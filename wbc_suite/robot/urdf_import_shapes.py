@@ -11,10 +11,16 @@ from pydantic import TypeAdapter
 from wbc_suite import logs
 from wbc_suite.errors import ConfigError, DescriptionError, join_first
 from wbc_suite.robot.adopt.importing import NameTable
-from wbc_suite.robot.mesh_files import MeshIndex, can_read, read_points
+from wbc_suite.robot.mesh_files import (
+    MeshIndex,
+    can_read,
+    read_points,
+    read_triangles,
+)
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.robot.shapes import Drawn
+from wbc_suite.robot.slab_hulls import slab_hulls
 from wbc_suite.robot.surfaces import surfaces_of_file
 from wbc_suite.robot.urdf_elements import numbers, place_of, pose_of
 from wbc_suite.robot.xml_files import (
@@ -54,6 +60,14 @@ class MeshFolder:
             if path is not None and can_read(path):
                 self._shapes[key] = fit_hull(read_points(path) * scale)
         return self._shapes[key]
+
+    def slabs(self, filename: str, scale: Vector) -> list[dict[str, Any]]:
+        """Return the fields of hulls of the mesh's slabs; none if it has no faces."""
+        path = self.find(filename)
+        if path is None or not can_read(path):
+            return []
+        vertices, faces = read_triangles(path)
+        return slab_hulls(vertices * scale, faces) if len(faces) else []
 
     def surfaces(self, filename: str, scale: Vector) -> list[dict[str, Any]]:
         """Return the surfaces of a mesh, scaled (3,); raises ConfigError."""
@@ -168,6 +182,21 @@ class UrdfShapes:
             self.skins[link.get("name", "")] = tuple(map(_DRAWN.validate_python, drawn))
         return {"visual": visual, "collision": collision}
 
+    def slabs(self, link: Element) -> list[dict[str, Any]]:
+        """Return a link's collision shapes, or else visual ones, with cut meshes."""
+        items = link.findall("collision") or link.findall("visual")
+        found: list[dict[str, Any]] = []
+        for item in items:
+            form = item.find("geometry/mesh")
+            pieces: list[dict[str, Any]] = []
+            if form is not None:
+                scale = _scale(form, place_of(link))
+                pieces = self._meshes.slabs(form.get("filename", ""), scale)
+            pose = pose_of(item, where=place_of(link))
+            placed = [_placed(piece, pose) for piece in pieces]
+            found += placed or self._shapes(item, link)
+        return found
+
     def report(self, path: Path) -> None:
         """Log which meshes are absent, and which shapes were left out."""
         self._meshes.report()
@@ -220,9 +249,14 @@ class UrdfShapes:
         shape = self._meshes.hull(form.get("filename", ""), _scale(form, where))
         if shape is None:
             return None
-        if "pos" in shape:  # a thin box has its own centre
-            pose = pose * pin.SE3(np.eye(3), np.asarray(shape["pos"]))
-        return shape | pose_fields(pose)
+        return _placed(shape, pose)
+
+
+def _placed(shape: dict[str, Any], pose: pin.SE3) -> dict[str, Any]:
+    """Return a hull at a pose; a thin box has its own centre."""
+    if "pos" in shape:
+        pose = pose * pin.SE3(np.eye(3), np.asarray(shape["pos"]))
+    return shape | pose_fields(pose)
 
 
 def _scale(form: Element, where: str) -> Vector:

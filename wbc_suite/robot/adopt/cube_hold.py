@@ -16,17 +16,20 @@ from wbc_suite.robot.elements import (
     rigid_bodies,
 )
 from wbc_suite.robot.poses import se3_of
-from wbc_suite.typing import Vector
 
 CUBE = 0.04  # m, side of the cube
 MASS = 0.1  # kg
-CLOSING, SHAKING = 0.5, 0.15
-"""Time to close, and of each of six pushes, s."""
+CLOSING, SQUEEZING, SHAKING = 0.5, 0.3, 0.15
+"""Time to close, until the shaking, and of each of six pushes, s."""
+DRAG = (20.0, 0.02)
+"""Of the cube until the hand is closed, N s/m and N m s: it does not drift away."""
 SHAKE = 15.0  # m/s^2; gravity and 5 m/s^2
 YIELDING = (0.1, 0.01)  # error at which a motor has its full effort, rad and m
-FAR, SLIP = 0.05, 0.02
-"""Greatest way of a held cube from the grasp, and of that the part when shaken, m."""
+SLIP = 0.02  # m; greatest way of a held cube when shaken
 EFFORT = 1.0  # N m or N, of a joint that has none
+MOST_EFFORT = (3.0, 50.0)
+"""Greatest effort of a joint, N m and N: a careful grip, on a lever of 6 cm 50 N. Many
+files state the peak of a motor."""
 
 
 def hand_alone(
@@ -66,43 +69,48 @@ def hand_alone(
     )
 
 
-def holds_cube(hand: RobotDescription, synergy: Synergy, tcp: Frame | None) -> bool:
-    """Whether a cube of 4 cm and 100 g at the `tcp` stays there when the hand closes.
+def way_of_cube(hand: RobotDescription, synergy: Synergy, tcp: Frame | None) -> float:
+    """Return how far a cube of 4 cm and 100 g is moved from the `tcp`, m, inf if lost.
 
-    Then the palm is pushed along all axes by 15 m/s^2, which act on the cube as
-    gravity does.
+    The hand closes in half a second. Then the palm is pushed along all axes by 15
+    m/s^2, which act on the cube as gravity does.
     """
     if tcp is None or tcp.link not in {link.name for link in hand.links}:
-        return False
+        return np.inf
     model = _scene(hand, synergy, tcp)
     data = mujoco.MjData(model)
-    for joint, value in hand.posture(synergy.open).items():
-        if joint not in hand.joint_names:  # of the wrist
-            continue
-        data.joint(joint).qpos[0] = value
+    for name, value in hand.posture(_own(hand, synergy.open)).items():
+        data.joint(name).qpos[0] = value
     mujoco.mj_kinematics(model, data)
     cube = model.joint("cube").qposadr[0]
     begin = data.site("grasp").xpos.copy()
     data.qpos[cube : cube + 3] = begin
     mujoco.mju_mat2Quat(data.qpos[cube + 3 : cube + 7], data.site("grasp").xmat)
-    data.ctrl[:] = [synergy.closed[model.actuator(k).name] for k in range(model.nu)]
-    _run(model, data, CLOSING, np.zeros(3))
+    dofs = model.joint("cube").dofadr[0] + np.arange(6)
+    model.dof_damping[dofs] = np.repeat(DRAG, 3)
+    model.opt.gravity[:] = 0.0
+    names = [model.actuator(k).name for k in range(model.nu)]
+    ends = np.array([[synergy.open[x], synergy.closed[x]] for x in names])
+    steps = round(CLOSING / model.opt.timestep)
+    for share in np.linspace(0.0, 1.0, steps):
+        data.ctrl[:] = ends @ (1.0 - share, share)
+        mujoco.mj_step(model, data)
+    mujoco.mj_step(model, data, round(SQUEEZING / model.opt.timestep))
+    model.dof_damping[dofs] = 0.0
     gripped = data.qpos[cube : cube + 3].copy()
     for push in (*np.eye(3), *-np.eye(3)):
-        _run(model, data, SHAKING, SHAKE * push)
+        model.opt.gravity[:] = SHAKE * push
+        mujoco.mj_step(model, data, round(SHAKING / model.opt.timestep))
     moved, slip = (
         float(np.linalg.norm(data.qpos[cube : cube + 3] - x)) for x in (begin, gripped)
     )
-    held = moved < FAR and slip < SLIP and data.ncon > 0
-    return held and not data.warning.number.any()
+    held = slip < SLIP and data.ncon > 0 and not data.warning.number.any()
+    return moved if held else np.inf
 
 
-def _run(
-    model: mujoco.MjModel, data: mujoco.MjData, seconds: float, gravity: Vector
-) -> None:
-    model.opt.gravity[:] = gravity
-    for _ in range(round(seconds / model.opt.timestep)):
-        mujoco.mj_step(model, data)
+def _own(hand: RobotDescription, values: dict[str, float]) -> dict[str, float]:
+    """Return the values of a hand's joints, without those of its wrist."""
+    return {name: x for name, x in values.items() if name in hand.joint_names}
 
 
 def _scene(hand: RobotDescription, synergy: Synergy, tcp: Frame) -> mujoco.MjModel:
@@ -110,9 +118,8 @@ def _scene(hand: RobotDescription, synergy: Synergy, tcp: Frame) -> mujoco.MjMod
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     for actuator in list(spec.actuators):
         spec.delete(actuator)
-    for name in synergy.open:
-        if name in hand.joint_names:
-            _add_servo(spec, hand.joint(name))
+    for name in _own(hand, synergy.open):
+        _add_servo(spec, hand.joint(name))
     for geom in spec.geoms:  # the hand collides with the cube only
         geom.conaffinity, geom.contype = (2, 1) if geom.contype else (0, 0)
     site = spec.body(tcp.link).add_site(name="grasp")
@@ -133,7 +140,7 @@ def _scene(hand: RobotDescription, synergy: Synergy, tcp: Frame) -> mujoco.MjMod
 
 
 def _add_servo(spec: mujoco.MjSpec, joint: Joint) -> None:
-    effort = joint.effort or EFFORT
+    effort = min(joint.effort or EFFORT, MOST_EFFORT[joint.type == "slide"])
     stiffness = effort / YIELDING[joint.type == "slide"]
     rotor = max(joint.armature, 1e-4 * effort)
     actuator = spec.add_actuator(name=joint.name, target=joint.name)

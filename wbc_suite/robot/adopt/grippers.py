@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.robot.adopt.cube_hold import CUBE, hand_alone, holds_cube
+from wbc_suite.robot.adopt.cube_hold import CUBE, hand_alone, way_of_cube
 from wbc_suite.robot.adopt.jaws import OPENING, TURNS, jaw_tip, points_on
 from wbc_suite.robot.adopt.posed_robot import PosedRobot
 from wbc_suite.robot.description import RobotDescription
@@ -22,6 +22,9 @@ from wbc_suite.typing import Matrix, Vector
 APART = 1e-3  # m; a motion that changes the distance of fingers less neither closes
 INSETS = (0.01, 0.025, 0.04)
 """Distances of a grasp from the tips, m; Franka's is 9 mm behind them."""
+STAYS, FAR = 0.02, 0.05
+"""Ways of a cube that is gripped, in m: with less no other grasp is tried, with more it
+is not held."""
 PARALLEL = 0.7  # least cosine between axes that bend a finger the same way
 ALIKE = 0.9  # least cosine between the axes of two fingers beside each other
 STEPS = 21  # postures from open to closed that are compared
@@ -36,11 +39,15 @@ class Gripper(NamedTuple):
         tcp: A frame between the fingers, if the robot has none; z points from the palm
             to the fingers, y from one finger to the next.
         reason: Why, as a sentence.
+        held: Whether it holds a cube of 4 cm in simulation.
+        links: What touches an object: the palm and the moving links.
     """
 
     synergy: Synergy
     tcp: Frame | None
     reason: str
+    held: bool
+    links: tuple[str, ...]
 
 
 def infer_grippers(robot: RobotDescription) -> dict[str, Gripper]:
@@ -53,9 +60,9 @@ def infer_grippers(robot: RobotDescription) -> dict[str, Gripper]:
     it closest to the fingers; those of other fingers stay at zero. A hand
     of three fingers or more opens to zero.
 
-    The grasp lies between the tips where they are as far apart as a cube of 4 cm. The
-    first proposal that holds this cube is taken: closed fully or only until the tips
-    meet, with a grasp 10 or 25 mm from the tips.
+    The grasp lies between the tips where they are as far apart as a cube of 4 cm. Of
+    the proposals that hold this cube that is taken which moves it least: closed fully
+    or only until the tips meet, with a grasp 10, 25 or 40 mm from the tips.
     """
     found: dict[str, Gripper] = {}
     for group in robot.groups:
@@ -70,13 +77,19 @@ def _infer(robot: RobotDescription, group: str, hand: "_Hand") -> Gripper:
     given = [frame for frame in robot.frames if frame.role == "tcp"]
     own = next((x for x in given if x.name == name or x.name.startswith(side)), None)
     proposals = list(hand.proposals(group, name))
-    holding = (p for p in proposals if holds_cube(hand.alone, p.synergy, own or p.tcp))
-    best = next(holding, None)
-    chosen = best or proposals[0]
-    said = "held" if best else "not held"
+    chosen, least = proposals[0], FAR
+    for proposal in proposals:
+        way = way_of_cube(hand.alone, proposal.synergy, own or proposal.tcp)
+        if way < least:
+            chosen, least = proposal, way
+        if way < STAYS:
+            break
+    held = least < FAR
+    said = "held" if held else "not held"
     reason = f"{chosen.reason}; a cube of 4 cm is {said} in simulation"
     synergy = chosen.synergy.model_copy(update={"reason": reason})
-    return Gripper(synergy, None if own else chosen.tcp, reason)
+    links = tuple(link.name for link in hand.alone.links)
+    return Gripper(synergy, None if own else chosen.tcp, reason, held, links)
 
 
 class _Proposal(NamedTuple):

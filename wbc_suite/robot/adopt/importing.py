@@ -97,6 +97,7 @@ def describe_import(
     lines: Mapping[str, str] | None = None,
     meshes: Mapping[str, str] | None = None,
     strict: bool = False,
+    slabs: Callable[[str], Sequence[dict[str, Any]]] | None = None,
     **others: Any,
 ) -> RobotDescription:
     """Check imported links and frames, and infer what the file does not define.
@@ -106,6 +107,8 @@ def describe_import(
     warning, or refused if the import is `strict`. An implausible inertia is only a
     warning, since some meshes may not be read. Messages tell the `lines` of links.
     Names of files of `meshes`, by link, may tell mecanum wheels.
+    `slabs` gives the shapes of a link with meshes cut to several hulls: a gripper that
+    drops a cube between single hulls takes them if it holds the cube then.
 
     Raises:
         DescriptionError: If the robot is inconsistent, or unphysical and `strict`.
@@ -152,7 +155,7 @@ def describe_import(
     }
     robot = parse_model(RobotDescription, data | others, **how)
     try:
-        robot = _with_grippers(robot, source, names.take)
+        robot = _with_grippers(robot, source, names.take, slabs)
     except ValueError as error:  # of MuJoCo's compiler
         raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
     if wheeled is not None:
@@ -195,16 +198,26 @@ def _with_motors(
 
 
 def _with_grippers(
-    robot: RobotDescription, source: Path, take: Callable[[str, str], str]
+    robot: RobotDescription,
+    source: Path,
+    take: Callable[[str, str], str],
+    slabs: Callable[[str], Sequence[dict[str, Any]]] | None,
 ) -> RobotDescription:
     """Return the robot with the synergies and grasps of its grippers, which open."""
     found = infer_grippers(robot)
+    loose = {name for x in found.values() if not x.held for name in x.links}
+    if slabs is not None and loose:
+        cut = _with_slabs(robot, loose, slabs)
+        better = infer_grippers(cut) if cut != robot else found
+        if sum(x.held for x in better.values()) > sum(x.held for x in found.values()):
+            robot, found = cut, better
     frames, ready = list(robot.frames), dict(robot.keyframes["ready"])
-    for group, (synergy, tcp, reason) in found.items():
-        LOG.info("%s: %s: %s.", source, group, reason)
-        ready |= synergy.open
-        if tcp is not None:
-            frames.append(tcp.model_copy(update={"name": take(tcp.name, "frame")}))
+    for group, own in found.items():
+        LOG.info("%s: %s: %s.", source, group, own.reason)
+        ready |= own.synergy.open
+        if own.tcp is not None:
+            name = take(own.tcp.name, "frame")
+            frames.append(own.tcp.model_copy(update={"name": name}))
     update = {
         "synergies": {group: (own.synergy,) for group, own in found.items()},
         "frames": tuple(frames),
@@ -213,6 +226,24 @@ def _with_grippers(
     return RobotDescription.model_validate(
         {key: getattr(robot, key) for key in RobotDescription.model_fields} | update
     )
+
+
+def _with_slabs(
+    robot: RobotDescription,
+    names: Collection[str],
+    slabs: Callable[[str], Sequence[dict[str, Any]]],
+) -> RobotDescription:
+    """Return the robot with collision shapes of some links cut to several hulls."""
+
+    def cut(link: Link) -> Link:
+        shapes = list(slabs(link.name)) if link.name in names else []
+        if len(shapes) <= len(link.collision or link.visual):
+            return link
+        fields = {"name": link.name, "collision": shapes}
+        finer = parse_model(Link, fields, source=robot.name, error=DescriptionError)
+        return link.model_copy(update={"collision": finer.collision})
+
+    return robot.model_copy(update={"links": tuple(map(cut, robot.links))})
 
 
 def _held(root: LinkFields, links: Sequence[Link], source: Path) -> LinkFields:

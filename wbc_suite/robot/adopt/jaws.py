@@ -18,7 +18,7 @@ TURNS = 73  # postures that are compared; 5 degrees of a full turn
 WRIST, FINGER = 2, 0.25
 """Most joints before a palm, and greatest length of a finger, m. Those of the Shadow
 hand, of 2 joints and 0.15 m, are the most of 30 hands."""
-OPENING = 1.2  # rad from closed to open of a jaw whose file states no limits
+OPENING = 1.6  # rad from closed to open of a jaw whose file states no limits
 
 
 def closes_on_parent(links: Sequence[Link], name: str) -> bool:
