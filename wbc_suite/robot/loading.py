@@ -9,8 +9,10 @@ from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.robot.assembly import assemble, describe_component
 from wbc_suite.robot.component_choice import Choice
 from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.dressing import dress
+from wbc_suite.robot.mesh_files import MODELS
 from wbc_suite.robot.robot_file import Component, read_robot_file
-from wbc_suite.robot.skins import PLAIN, SkinFinder
+from wbc_suite.robot.skins import PLAIN, SkinFinder, read_model
 from wbc_suite.typing import RobotName
 
 LOG = logs.logger(__name__)
@@ -43,7 +45,8 @@ def load_robot(
             its first link to a link `world` is free if it has four feet or more, else
             fixed. A free robot that has hands, but no feet, is planar.
         skin: "meshes" draws the robot with meshes of installed packages; a folder with
-            those found there, see `robot.skins`. A URDF or MJCF file is drawn with its
+            those found there; a URDF or MJCF file of the same robot with its meshes,
+            see `robot.dressing`. A robot from a URDF or MJCF file is drawn with its
             own meshes, and with hulls of these by "none". Physics does not change.
         mesh_root: Folder that a URDF or MJCF file may read meshes from; by default the
             package or model folder around it.
@@ -65,6 +68,19 @@ def load_robot(
     if not isinstance(name, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise UnknownNameError("robot", name, catalogue.called("robots"))
     path = _locate(str(name), catalogue)
+    model = _model(skin)
+    if model is not None:
+        robot = load_robot(
+            name,
+            gripper=gripper,
+            base=base,
+            root=root,
+            skin=PLAIN,
+            mesh_root=mesh_root,
+            strict=strict,
+            catalogue=catalogue,
+        )
+        return _dressed(robot, model)
     if path.suffix == ".toml":
         skins = None if skin in (None, PLAIN) else SkinFinder(skin, catalogue)
         robot = _read(path, catalogue, gripper=gripper, base=base, skins=skins)
@@ -79,6 +95,19 @@ def load_robot(
     if path.suffix == ".toml" or robot.root.kind != "free":
         return robot
     return _standing(robot, path, asked=root == "free")
+
+
+def _model(skin: str | Path | None) -> Path | None:
+    """Return a skin that is a model file."""
+    path = Path(skin or "")
+    return path if path.suffix.lower() in MODELS and path.is_file() else None
+
+
+def _dressed(robot: RobotDescription, model: Path) -> RobotDescription:
+    drawn = dress(robot, read_model(model))
+    if not drawn:
+        raise ConfigError(f"skin: {model} has no meshes for '{robot.name}'.")
+    return robot.model_copy(update={"skins": drawn})
 
 
 def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescription:
