@@ -65,6 +65,7 @@ def _dressed(
 ) -> tuple[dict[str, Any], list[Any]]:
     """Return what is said of a robot, and pictures of it without and with meshes."""
     from wbc_suite.robot import load_robot
+    from wbc_suite.robot.shapes import SkinMesh
     from wbc_suite.robot.skins import package_of
     from wbc_suite.viewers.offscreen import render_robot
     from wbc_suite.viewers.silhouettes import overlap
@@ -75,14 +76,9 @@ def _dressed(
         robot = load_robot(name, skin=skin)
     except ConfigError as error:
         return row | {"missing": str(error)}, []
-    row["packages"] = sorted(
-        {
-            package_of(s.file)
-            for d in robot.skins.values()
-            for s in d
-            if hasattr(s, "file")
-        }
-    )
+    meshes = [s for drawn in robot.skins.values() for s in drawn]
+    files = {mesh.file for mesh in meshes if isinstance(mesh, SkinMesh)}
+    row["packages"] = sorted({package_of(file) for file in files})
     row["links"] = len(robot.skins)
     row["plain"] = [link.name for link in robot.links if _is_plain(robot, link.name)]
     row["overlap"] = overlap(plain, robot)

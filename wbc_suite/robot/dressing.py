@@ -28,6 +28,7 @@ FAR = 0.008  # most distance between matched axes, m; vendors' own files differ 
 TURN = 0.05  # most angle between matched axes, rad
 MAX_HYPOTHESES = 20_000
 """Most transforms that are tried; two humanoids of 43 joints have 9,000."""
+ACROSS = 0.02  # least length, 1 or m, of what shows how a joint is turned
 SAMPLES = 500  # most points of a surface that are compared
 BEST = 40  # transforms under which the trees of joints are compared
 SKIP = 3  # most joints of the other robot that ours lacks, one below the other
@@ -57,7 +58,7 @@ class _Body:
     type: str = ""
     point: Vector = field(default_factory=lambda: np.zeros(3))
     axis: Vector = field(default_factory=lambda: np.zeros(3))
-    below: "list[_Body]" = field(default_factory=list)
+    below: "list[_Body]" = field(default_factory=list["_Body"])
 
 
 _Match: TypeAlias = tuple[_Body, list[_Body], Any]
@@ -134,7 +135,8 @@ def _best(
     """
     found: dict[tuple[float, ...], tuple[int, Any]] = {}
     for T in itertools.islice(_hypotheses(ours, theirs), MAX_HYPOTHESES):
-        key = tuple(np.round(T.homogeneous.ravel(), 2).tolist())
+        entries: Matrix = T.homogeneous
+        key = tuple(np.round(entries, 2).ravel().tolist())
         if key not in found:
             found[key] = _count(ours[1:], theirs[1:], T), T
     ranked = sorted(found.values(), key=lambda item: (-item[0], _angle(item[1])))
@@ -160,11 +162,11 @@ def _points(body: _Body, robot: RobotDescription) -> Matrix:
     for link, place in body.links:
         for shape in robot.drawn(link):
             if isinstance(shape, SkinMesh):
-                own, T = skin_triangles(shape)[0], place * se3_of(shape)
+                own, pose = skin_triangles(shape)[0], place * se3_of(shape)
                 own = own[:: max(1, len(own) // SAMPLES)]
             else:
-                own, T = _corners(shape), place
-            found.append(own @ T.rotation.T + T.translation)
+                own, pose = _corners(shape), place
+            found.append(own @ pose.rotation.T + pose.translation)
     return np.concatenate(found)
 
 
@@ -226,9 +228,8 @@ def _matched(own: _Body, other: _Body, T: Any) -> list[_Match]:
                 bodies += [b for b in between if b not in bodies]
                 found += _matched(child, body, turned)
         if found:
-            T = turned
-            break
-    return [(own, bodies, T), *found]
+            return [(own, bodies, turned), *found]
+    return [(own, bodies, T)]
 
 
 def _descendants(
@@ -267,21 +268,24 @@ def _turns(own: _Body, other: _Body, T: Any) -> Iterator[Any]:
     if own.type != "hinge":
         return
     for child, (body, _) in itertools.product(own.below, _descendants(other)):
-        ends = []
-        for p, a in (
-            (child.point, child.axis),
-            (T * body.point, T.rotation @ body.axis),
-        ):
-            arm = p - own.point
-            flat = [v - own.axis * (own.axis @ v) for v in (a, arm)]
-            ends.append(next((v for v in flat if np.linalg.norm(v) > 0.02), None))
-        if ends[0] is not None and ends[1] is not None:
-            sine = own.axis @ np.cross(ends[1], ends[0])
-            turn = float(np.arctan2(sine, ends[1] @ ends[0]))
-            back = pin.SE3(np.eye(3), own.point)
-            for angle in (turn, turn + np.pi):  # an axis may point either way
-                motion = joint_motion(own.axis, angle, slide=False)
-                yield back * motion * back.inverse() * T
+        one = _across(own, child.point, child.axis)
+        two = _across(own, T * body.point, T.rotation @ body.axis)
+        if one is None or two is None:
+            continue
+        turn = float(np.arctan2(own.axis @ np.cross(two, one), two @ one))
+        back = pin.SE3(np.eye(3), own.point)
+        for angle in (turn, turn + np.pi):  # an axis may point either way
+            motion = joint_motion(own.axis, angle, slide=False)
+            yield back * motion * back.inverse() * T
+
+
+def _across(own: _Body, point: Vector, axis: Vector) -> Vector | None:
+    """Return a vector across a joint's axis that another axis turns with; or None."""
+    for vector in (axis, point - own.point):
+        flat = vector - own.axis * float(own.axis @ vector)
+        if float(np.linalg.norm(flat)) > ACROSS:
+            return flat
+    return None
 
 
 def _hypotheses(ours: list[_Body], theirs: list[_Body]) -> Iterator[Any]:

@@ -11,6 +11,7 @@ from wbc_suite.robot.component_choice import Choice
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.dressing import dress
 from wbc_suite.robot.mesh_files import MODELS
+from wbc_suite.robot.named_files import named_file
 from wbc_suite.robot.robot_file import Component, read_robot_file
 from wbc_suite.robot.skins import PLAIN, SkinFinder, read_model
 from wbc_suite.typing import RobotName
@@ -35,7 +36,9 @@ def load_robot(
 
     Args:
         name: Catalogue name, ignoring case (`Panda`, `gr1`), a component with its
-            folder (`gripper/panda_gripper`), or a path to a .toml, .urdf or .xml.
+            folder (`gripper/panda_gripper`), a path to a .toml, .urdf or .xml, or the
+            name of a file in a collection (`menagerie:unitree_g1`), see
+            `robot.named_files`.
         gripper: Another gripper for every side, or one per side: `{"right": ...}`;
             "none" leaves it out and puts `tcp` at the flange. `InspireHand` stands for
             the hand of each side. A name that ends in .toml is a file.
@@ -99,7 +102,7 @@ def load_robot(
 
 def _model(skin: str | Path | None) -> Path | None:
     """Return a skin that is a model file."""
-    path = Path(skin or "")
+    path = named_file(str(skin)) or Path(skin or "")
     return path if path.suffix.lower() in MODELS and path.is_file() else None
 
 
@@ -131,7 +134,7 @@ def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescr
 
 
 def _locate(name: str, catalogue: Catalogue) -> Path:
-    path = Path(name)
+    path = named_file(name) or Path(name)
     if path.suffix.lower() in (".toml", ".urdf", ".xml", ".mjcf"):
         if not path.is_file():
             raise ConfigError(f"{path}: the file does not exist.")
