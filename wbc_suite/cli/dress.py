@@ -56,6 +56,8 @@ def dress(
         print(json.dumps(rows, indent=1))
     if output is not None:
         _write(output, pictures)
+        if not as_json:
+            print(f"Wrote {output}.")
     if not any(row["overlap"] for row in rows):
         raise typer.Exit(1)
 
@@ -122,4 +124,3 @@ def _write(output: Path, pictures: list[Any]) -> None:
             sheet.paste(Image.fromarray(picture), (x + CELL * side, y))
         ImageDraw.Draw(sheet).text((x + 8, y + 8), title, fill="black", font_size=18)
     replace_file(output, sheet.save)
-    print(f"Wrote {output}.")
