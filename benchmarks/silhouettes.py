@@ -22,15 +22,12 @@ import numpy as np
 import pinocchio as pin
 import trimesh
 from harness.report import Report, machine, options, write_between
-from numpy.typing import NDArray
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.robot import RobotDescription, load_robot
-from wbc_suite.typing import Vector
+from wbc_suite.viewers.silhouettes import SIDES, silhouettes, surroundings
 
 LEAST = 0.97  # intersection over union
-SIDES = {"front": 180.0, "side": 90.0, "oblique": 135.0}  # azimuth of the camera, deg
-SIZE = 480  # pixels
 PAGE = Path(__file__).parents[1] / "docs" / "robots.md"
 MARKS = "<!-- silhouettes -->", "<!-- end of silhouettes -->"
 
@@ -110,29 +107,6 @@ def still(meshes: Iterator[trimesh.Trimesh]) -> mujoco.MjModel:
     return spec.compile()
 
 
-def silhouettes(
-    m: mujoco.MjModel, data: mujoco.MjData, at: Vector
-) -> dict[str, NDArray[np.bool_]]:
-    """Return the pixels of visual shapes by side, shape (SIZE, SIZE), around a point.
-
-    The extent of the picture is the fourth number of `at`, m.
-    """
-    solid = (m.geom_contype | m.geom_conaffinity) > 0
-    m.geom_group[:] = solid & (~solid).any()
-    option = mujoco.MjvOption()
-    option.geomgroup[:], option.sitegroup[:] = [1, 0, 0, 0, 0, 0], 0
-    camera = mujoco.MjvCamera()
-    camera.lookat[:], camera.distance, camera.elevation = at[:3], 1.3 * at[3], -15.0
-    found: dict[str, NDArray[np.bool_]] = {}
-    with mujoco.Renderer(m, SIZE, SIZE) as renderer:
-        renderer.enable_segmentation_rendering()
-        for side, azimuth in SIDES.items():
-            camera.azimuth = azimuth
-            renderer.update_scene(data, camera, scene_option=option)
-            found[side] = renderer.render()[..., 1] == int(mujoco.mjtObj.mjOBJ_GEOM)
-    return found
-
-
 def compare(name: str, folder: Path) -> dict[str, dict[str, float]]:
     """Return intersection over union by reader and side."""
     robot = load_robot(name).with_root("fixed")
@@ -141,9 +115,7 @@ def compare(name: str, folder: Path) -> dict[str, dict[str, float]]:
     path.write_text(text, encoding="utf-8")
     ours = robot.to_mjspec().compile()
     data = pose(ours, robot)
-    low = (data.geom_xpos - ours.geom_rbound[:, None]).min(axis=0)
-    high = (data.geom_xpos + ours.geom_rbound[:, None]).max(axis=0)
-    at = np.array([*(low + high) / 2, np.linalg.norm(high - low)])
+    at = surroundings(ours, data)
     first = silhouettes(ours, data, at)
     read = mujoco.MjModel.from_xml_path(str(path))
     others = {"MuJoCo": (read, pose(read, robot))}

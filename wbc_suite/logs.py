@@ -5,6 +5,8 @@ command the terminal that shows them.
 """
 
 import logging
+from collections.abc import Generator
+from contextlib import contextmanager
 
 from wbc_suite.errors import printable
 
@@ -14,6 +16,18 @@ def logger(name: str) -> logging.Logger:
     found = logging.getLogger(name)
     found.addFilter(_escape)
     return found
+
+
+@contextmanager
+def quiet(name: str) -> Generator[None]:
+    """Leave out the warnings of modules whose names begin so."""
+    parent = logging.getLogger(name)
+    level = parent.level
+    parent.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        parent.setLevel(level)
 
 
 def _escape(record: logging.LogRecord) -> bool:

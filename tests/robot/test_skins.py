@@ -2,6 +2,7 @@
 
 import sys
 import tomllib
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -11,8 +12,9 @@ import trimesh
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError
+from wbc_suite.robot.assembly import describe_component
 from wbc_suite.robot.robot_file import read_robot_file
-from wbc_suite.robot.skins import PROVIDERS, SkinFinder
+from wbc_suite.robot.skins import SkinFinder, read_skin
 
 TABLES = Catalogue().files("robots/skin")
 COMPONENTS = [
@@ -209,7 +211,7 @@ def test_what_is_partly_missing_is_a_warning(package, caplog):
 
 
 def test_a_skin_that_is_neither_is_an_error(tmp_path):
-    with pytest.raises(ConfigError, match="neither 'meshes' nor a folder"):
+    with pytest.raises(ConfigError, match="neither 'meshes', nor a folder"):
         wbc_suite.load_robot("Panda", skin="mesh")
 
 
@@ -242,10 +244,46 @@ def is_table_of(path, name):
 @pytest.mark.parametrize("path", TABLES, ids=lambda p: p.stem)
 def test_every_table_fits_its_component(path, tmp_path):
     """Each link exists, each provider is known, and the skin loads."""
-    table = tomllib.loads(path.read_text())
-    assert table["provider"] in PROVIDERS
-    write_meshes(tmp_path, [path.stem])
+    table = read_skin(path)
     (component,) = [c for c in COMPONENTS if is_table_of(path, c.component.name)]
-    links = [link.name for link in component.links]
-    skinned = SkinFinder(tmp_path, Catalogue()).meshes(component.component.name, links)
-    assert set(skinned) == set(table["link"])
+    for model in table.model:
+        assert Path(model.file).suffix in (".urdf", ".xml")
+    if table.link:
+        write_meshes(tmp_path, [path.stem])
+        robot = describe_component(component, source=path.name)
+        finder = SkinFinder(tmp_path, Catalogue())
+        skinned = finder.meshes(component.component.name, robot)
+        assert set(skinned) == set(table.link)
+        assert finder.found == {component.component.name: table.provider}
+
+
+def test_a_component_is_dressed_by_the_first_model_that_is_found(tmp_path):
+    plain = wbc_suite.load_robot("gripper/pr2_gripper")
+    tables, vendor = tmp_path / "own" / "robots" / "skin", tmp_path / "vendor"
+    tables.mkdir(parents=True)
+    vendor.mkdir()
+    lines = [
+        f'[[model]]\nprovider = "mjlab"\nfile = "pr2/{name}.urdf"\n'
+        for name in ("absent", "hand")
+    ]
+    (tables / "pr2_gripper.toml").write_text("format = 1\n" + "\n".join(lines))
+    text = plain.to_urdf(mesh_dir=vendor / "meshes")
+    (vendor / "hand.urdf").write_text(text)
+    own = Catalogue(extra=(tmp_path / "own",))
+    robot = wbc_suite.load_robot("gripper/pr2_gripper", skin=vendor, catalogue=own)
+    assert set(robot.skins) == {link.name for link in plain.links}
+    with pytest.raises(ConfigError, match="pip install --no-deps mjlab"):
+        wbc_suite.load_robot("gripper/pr2_gripper", skin="meshes", catalogue=own)
+
+
+def test_a_model_that_mujoco_refuses_is_a_warning(tmp_path, caplog):
+    (tmp_path / "hand.xml").write_text("<mujoco><body/></mujoco>")
+    tables = tmp_path / "own" / "robots" / "skin"
+    tables.mkdir(parents=True)
+    (tables / "pr2_gripper.toml").write_text(
+        'format = 1\n[[model]]\nprovider = "mjlab"\nfile = "hand.xml"\n'
+    )
+    own = Catalogue(extra=(tmp_path / "own",))
+    with pytest.raises(ConfigError, match="not found"):
+        wbc_suite.load_robot("gripper/pr2_gripper", skin=tmp_path, catalogue=own)
+    assert "hand.xml" in caplog.text

@@ -49,9 +49,11 @@ def adopt(
     `free` for a robot that has to stand and walk.
     """
     from wbc_suite.robot import load_robot
+    from wbc_suite.robot.named_files import named_file
     from wbc_suite.viewers.adopt_page import AdoptPage
     from wbc_suite.viewers.page_server import PageServer
 
+    file = named_file(str(file)) or file
     notes = _Notes()
     logging.getLogger("wbc_suite").addHandler(notes)
     robot = load_robot(file, root=root, mesh_root=mesh_root)

@@ -17,6 +17,7 @@ from wbc_suite.cli import (
     datasets,
     demo,
     doctor,
+    dress,
     evaluate,
     expert,
     multiply,
@@ -53,6 +54,7 @@ app.command("extract")(datasets.extract)
 app.command("convert")(datasets.convert)
 app.command("list")(catalogue.list_catalogue)
 app.command("render")(robots.render)
+app.command("dress")(dress.dress)
 app.command("expert")(expert.expert)
 app.command("evaluate")(evaluate.evaluate)
 app.command("serve-policy")(evaluate.serve_policy)
@@ -72,7 +74,7 @@ def _show_version(asked: bool) -> None:
 
 LOADS = (
     *("teleop", "view", "demo", "adopt", "record", "multiply", "replay", "render"),
-    *("expert", "evaluate", "serve-policy", "bench"),
+    *("dress", "expert", "evaluate", "serve-policy", "bench"),
 )
 """Commands that import for a second before they have something to say."""
 

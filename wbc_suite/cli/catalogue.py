@@ -150,7 +150,9 @@ def check_file(
     and the rule. A JSON file is a controller config of robosuite; it needs --robot.
     """
     from wbc_suite.config_files import read_toml
+    from wbc_suite.robot.named_files import named_file
 
+    file = named_file(str(file)) or file
     content = read_toml(file) if file.suffix == ".toml" else {"component": None}
     inferred: dict[str, list[str]] = {}
     controls = _controls(file, content)

@@ -23,7 +23,9 @@ T = TypeVar("T")
 RobotArgument = Annotated[
     str,
     typer.Argument(
-        metavar="ROBOT", help="Name (`wbc-suite list`) or a .toml, .urdf or .xml file."
+        metavar="ROBOT",
+        help="Name (`wbc-suite list`), a .toml, .urdf or .xml file, or "
+        "menagerie:NAME or robot_descriptions:NAME.",
     ),
 ]
 GripperOption = Annotated[

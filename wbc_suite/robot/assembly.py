@@ -60,9 +60,9 @@ def _skins(
     """Return the meshes of a component's links, with prefixed names."""
     if skins is None:
         return {}
-    links = [link.name for link in component.links]
     header = component.component
-    found = skins.meshes(header.extends or header.name, links)
+    plain = describe_component(component, source=header.name)
+    found = skins.meshes(header.extends or header.name, plain)
     return {prefix + n: with_colors(own, colors or {}) for n, own in found.items()}
 
 

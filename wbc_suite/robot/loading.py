@@ -9,8 +9,11 @@ from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.robot.assembly import assemble, describe_component
 from wbc_suite.robot.component_choice import Choice
 from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.dressing import dress
+from wbc_suite.robot.mesh_files import MODELS
+from wbc_suite.robot.named_files import named_file
 from wbc_suite.robot.robot_file import Component, read_robot_file
-from wbc_suite.robot.skins import PLAIN, SkinFinder
+from wbc_suite.robot.skins import PLAIN, SkinFinder, read_model
 from wbc_suite.typing import RobotName
 
 LOG = logs.logger(__name__)
@@ -34,8 +37,9 @@ def load_robot(
 
     Args:
         name: Catalogue name, ignoring case (`Panda`, `gr1`), a component with its
-            folder (`gripper/panda_gripper`), or a path to a .toml, .urdf, .xacro or
-            .xml.
+            folder (`gripper/panda_gripper`), a path to a .toml, .urdf, .xacro or .xml,
+            or the name of a file in a collection (`menagerie:unitree_g1`), see
+            `robot.named_files`.
         gripper: Another gripper for every side, or one per side: `{"right": ...}`;
             "none" leaves it out and puts `tcp` at the flange. `InspireHand` stands for
             the hand of each side. A name that ends in .toml, .urdf or .xml is a file;
@@ -46,7 +50,8 @@ def load_robot(
             its first link to a link `world` is free if it has four feet or more, else
             fixed. A free robot that has hands, but no feet, is planar.
         skin: "meshes" draws the robot with meshes of installed packages; a folder with
-            those found there, see `robot.skins`. A URDF or MJCF file is drawn with its
+            those found there; a URDF or MJCF file of the same robot with its meshes,
+            see `robot.dressing`. A robot from a URDF or MJCF file is drawn with its
             own meshes, and with hulls of these by "none". Physics does not change.
         mesh_root: Folder that a URDF or MJCF file may read meshes from; by default the
             package or model folder around it.
@@ -68,6 +73,19 @@ def load_robot(
     if not isinstance(name, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise UnknownNameError("robot", name, catalogue.called("robots"))
     path = _locate(str(name), catalogue)
+    model = _model(skin)
+    if model is not None:
+        robot = load_robot(
+            name,
+            gripper=gripper,
+            base=base,
+            root=root,
+            skin=PLAIN,
+            mesh_root=mesh_root,
+            strict=strict,
+            catalogue=catalogue,
+        )
+        return _dressed(robot, model)
     if path.suffix == ".toml":
         skins = None if skin in (None, PLAIN) else SkinFinder(skin, catalogue)
         robot = _read(path, catalogue, gripper=gripper, base=base, skins=skins)
@@ -86,6 +104,19 @@ def load_robot(
     if path.suffix == ".toml" or robot.root.kind != "free":
         return robot
     return _standing(robot, path, asked=root == "free")
+
+
+def _model(skin: str | Path | None) -> Path | None:
+    """Return a skin that is a model file."""
+    path = named_file(str(skin)) or Path(skin or "")
+    return path if path.suffix.lower() in MODELS and path.is_file() else None
+
+
+def _dressed(robot: RobotDescription, model: Path) -> RobotDescription:
+    drawn = dress(robot, read_model(model))
+    if not drawn:
+        raise ConfigError(f"skin: {model} has no meshes for '{robot.name}'.")
+    return robot.model_copy(update={"skins": drawn})
 
 
 def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescription:
@@ -109,7 +140,7 @@ def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescr
 
 
 def _locate(name: str, catalogue: Catalogue) -> Path:
-    path = Path(name)
+    path = named_file(name) or Path(name)
     if path.suffix.lower() in (".toml", *URDF, ".xml", ".mjcf"):
         if not path.is_file():
             raise ConfigError(f"{path}: the file does not exist.")

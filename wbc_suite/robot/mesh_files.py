@@ -14,12 +14,13 @@ from wbc_suite.files import read_bytes
 from wbc_suite.typing import Indices, Matrix
 
 READABLE = (".stl", ".obj", ".glb", ".dae")  # suffixes of files that are meshes
+MODELS = (".urdf", ".xml")  # suffixes of models that name meshes
 MAX_BYTES = 100_000_000  # largest mesh file that is read
 MAX_FILES = 20_000  # of a folder that is searched for meshes
 
 
 class MeshIndex:
-    """The meshes among the first `MAX_FILES` files of a folder, found by their ends."""
+    """The meshes and models among the first `MAX_FILES` files of a folder."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -35,7 +36,7 @@ class MeshIndex:
     def _by_name(self) -> dict[str, list[Path]]:
         found: dict[str, list[Path]] = {}
         for path in islice(self._folder.rglob("*"), MAX_FILES):
-            if path.suffix.casefold() in READABLE:
+            if path.suffix.casefold() in (*READABLE, *MODELS):
                 found.setdefault(path.name.casefold(), []).append(path)
         return found
 

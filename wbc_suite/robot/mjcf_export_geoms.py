@@ -53,7 +53,7 @@ def add_collision_geoms(
     """Add the collision shapes of a link to its body."""
     for index, shape in enumerate(link.collision):
         geom = _add_geom(spec, body, shape, f"{link.name}_collision{index}")
-        geom.group, geom.mass, geom.rgba = COLLISION_GROUP, 0.0, _rgba(robot, shape)
+        geom.group, geom.mass, geom.rgba = COLLISION_GROUP, 0.0, rgba_of(robot, shape)
         if shape.solref is not None:
             geom.solref[:2] = shape.solref
             geom.solmix = STATED_SOLMIX
@@ -74,7 +74,7 @@ class VisualGeoms:
             return
         for link in robot.links:
             for shape in robot.drawn(link):
-                self._colors.setdefault(_rgba(robot, shape), len(self._colors))
+                self._colors.setdefault(rgba_of(robot, shape), len(self._colors))
         if len(self._colors) > 1:
             self._add_palette()
 
@@ -83,7 +83,7 @@ class VisualGeoms:
 
         Transparent shapes are not merged, because MuJoCo sorts them by depth.
         """
-        shapes = [(_rgba(self._robot, s), s) for s in self._robot.drawn(link)]
+        shapes = [(rgba_of(self._robot, s), s) for s in self._robot.drawn(link)]
         solid, single = [], shapes
         if self._merged and sum(rgba[3] == 1.0 for rgba, _ in shapes) > 1:
             solid = [(rgba, shape) for rgba, shape in shapes if rgba[3] == 1.0]
@@ -131,7 +131,7 @@ class VisualGeoms:
         material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = PALETTE
 
 
-def _rgba(robot: RobotDescription, shape: Drawn) -> Rgba:
+def rgba_of(robot: RobotDescription, shape: Drawn) -> Rgba:
     """Return the colour of a shape: that of its material, or its own values."""
     color = shape.color
     if isinstance(color, str):

@@ -55,6 +55,7 @@ def read_mjcf(
     mesh_root: Path | str | None = None,
     strict: bool = False,
     skin: bool = True,
+    contacts: bool = True,
 ) -> RobotDescription:
     """Read an MJCF file.
 
@@ -72,6 +73,7 @@ def read_mjcf(
             folder that encloses the file.
         strict: Refuse what is left out or mended with a warning otherwise.
         skin: Draw links with their meshes, not with the hulls of these.
+        contacts: Find the links that must not collide, by simulation.
 
     Raises:
         ConfigError: If the file is not MJCF, or refers to files outside the folder.
@@ -86,7 +88,7 @@ def read_mjcf(
     robot = importer.robot()
     if skin:
         robot = robot.model_copy(update={"skins": importer.skins()})
-    return exclude_contacts(robot, path)
+    return exclude_contacts(robot, path) if contacts else robot
 
 
 def _robot_roots(m: mujoco.MjModel) -> list[int]:

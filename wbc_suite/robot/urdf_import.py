@@ -52,6 +52,7 @@ def read_urdf(
     mesh_root: Path | str | None = None,
     strict: bool = False,
     skin: bool = True,
+    contacts: bool = True,
 ) -> RobotDescription:
     """Read a URDF file.
 
@@ -69,6 +70,7 @@ def read_urdf(
         strict: Refuse what is mended with a warning otherwise: inertias that no body
             can have, moving links without mass, faulty shapes.
         skin: Draw links with their meshes, not with the hulls of these.
+        contacts: Find the links that must not collide, by simulation.
 
     Raises:
         ConfigError: If the file is not URDF.
@@ -97,7 +99,7 @@ def read_urdf(
             LOG.warning("%s: its root is fixed: %s", path, error)
     if skin:
         robot = robot.model_copy(update={"skins": importer.skins()})
-    return exclude_contacts(robot, path)
+    return exclude_contacts(robot, path) if contacts else robot
 
 
 class _Importer:
