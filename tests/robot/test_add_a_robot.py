@@ -83,7 +83,8 @@ TABLES = {
     "hull": shapes.Hull,
     "loft": shapes.Loft,
 }
-SHARED = {"shape", "pos", "quat", "color", "friction", "condim", "solref", "margin"}
+SHARED = {"shape", "pos", "quat", "color"}
+SHARED |= {"friction", "condim", "solref", "margin", "priority"}
 
 
 @pytest.mark.parametrize(("table", "model"), TABLES.items())

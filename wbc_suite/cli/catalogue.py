@@ -166,12 +166,13 @@ def check_file(
 
         config = load_composite_controller_config(file, robot)
         found = f"{config['type']} of {_controlled(config)}."
-    elif "provider" in content:
+    elif "provider" in content or "model" in content:
         from wbc_suite.robot.skins import read_skin
 
         skin = read_skin(file)
         meshes = sum(len(pieces) for pieces in skin.link.values())
-        found = f"Skin: {len(skin.link)} links, {meshes} meshes of {skin.provider}."
+        found = f"Skin: {len(skin.link)} links with {meshes} meshes, {len(skin.model)} "
+        found += f"models; packages: {', '.join(skin.providers)}."
     else:
         found, inferred = _robot(file, root=root, mesh_root=mesh_root, strict=strict)
     if as_json:

@@ -58,8 +58,8 @@ def is_hand(links: Sequence[Link], kinds: Collection[str]) -> bool:
     """Whether all moving links are the fingers of one hand, with a wrist or without.
 
     Two fingers or more hang on one palm, behind two joints at most, and none reaches
-    farther than 25 cm; or it is one jaw. Legs, wheels and heads, by their names, and
-    joints without limits are no fingers.
+    farther than 25 cm; or it is one jaw. Legs, wheels and heads, by their names,
+    joints without limits, and links without shapes are no fingers.
     """
     rigid = rigid_bodies(links)
     moving = [link for link in links if link.joint is not None]
@@ -84,7 +84,7 @@ def is_hand(links: Sequence[Link], kinds: Collection[str]) -> bool:
         length + float(np.linalg.norm(points_on(links, name), axis=1).max(initial=0.0))
         for name, length in reach.items()
     ]
-    return not free and max(ends) < FINGER
+    return not free and 0.0 < max(ends) < FINGER
 
 
 def jaw_tip(points: Matrix, origin: Vector | float = 0.0) -> Vector:
