@@ -96,6 +96,18 @@ def test_one_jaw_against_a_fixed_one_is_a_gripper(tmp_path, axis, limits, opened
     assert action.shape[0] > 6
 
 
+def test_a_jaw_without_limits_stops_where_it_is_open_and_closed(tmp_path, caplog):
+    text = jawed(at="0.01 0 0.06")
+    last = text.rindex("revolute")
+    text = text[:last] + "continuous" + text[last + len("revolute") :]
+    robot = wbc_suite.load_robot(write(tmp_path, text))
+    (synergy,) = robot.synergies["right_gripper"]
+    ends = sorted((synergy.open["j"], synergy.closed["j"]))
+    assert robot.joint("j").range == tuple(ends)
+    assert gap(robot, synergy.open) > gap(robot, synergy.closed) + 0.05
+    assert "the jaw 'j' has no limits" in caplog.text
+
+
 def test_a_link_that_folds_on_its_forearm_is_no_gripper(tmp_path):
     text = chain(4) + link("l4", ("0 0 0.05", "0.04 0.04 0.1"))
     text += link("last", ("0 0 0.05", "0.04 0.04 0.1"))

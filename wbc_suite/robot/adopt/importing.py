@@ -1,14 +1,14 @@
 """Common steps of the URDF and MJCF import: names, checks, inferred groups."""
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from wbc_suite import logs
 from wbc_suite.config_files import parse_model
 from wbc_suite.errors import DescriptionError, join_first, shortened
-from wbc_suite.robot.adopt.grippers import infer_grippers
+from wbc_suite.robot.adopt.grippers import Gripper, infer_grippers
 from wbc_suite.robot.adopt.limbs import (
     Limb,
     infer_frames,
@@ -219,6 +219,7 @@ def _with_grippers(
             name = take(own.tcp.name, "frame")
             frames.append(own.tcp.model_copy(update={"name": name}))
     update = {
+        "links": _with_stops(robot.links, found.values(), source),
         "synergies": {group: (own.synergy,) for group, own in found.items()},
         "frames": tuple(frames),
         "keyframes": robot.keyframes | {"ready": ready},
@@ -226,6 +227,30 @@ def _with_grippers(
     return RobotDescription.model_validate(
         {key: getattr(robot, key) for key in RobotDescription.model_fields} | update
     )
+
+
+def _with_stops(
+    links: Sequence[Link], grippers: Iterable[Gripper], source: Path
+) -> tuple[Link, ...]:
+    """Return links whose jaws without limits end at open and closed, as stops."""
+    ends = {
+        joint: tuple(sorted((value, own.synergy.closed[joint])))
+        for own in grippers
+        for joint, value in own.synergy.open.items()
+    }
+
+    def stopped(link: Link) -> Link:
+        joint = link.joint
+        if joint is None or joint.range is not None or joint.name not in ends:
+            return link
+        LOG.warning(
+            "%s: the jaw '%s' has no limits; mended: %.3g to %.3g.",
+            *(source, joint.name, *ends[joint.name]),
+        )
+        update = {"range": ends[joint.name]}
+        return link.model_copy(update={"joint": joint.model_copy(update=update)})
+
+    return tuple(map(stopped, links))
 
 
 def _with_slabs(
