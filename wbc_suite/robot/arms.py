@@ -19,9 +19,12 @@ def arm_of(robot: RobotDescription, frame: str) -> tuple[Link, ...]:
     """Return the links from a frame to its shoulder, the frame's own first.
 
     They carry no other hand, no foot and no head; empty if the frame's own link does.
+    One hand that this link carries is the arm's own, as that beyond a wrist.
     """
     ends = {f.name for f in robot.frames if f.role in ("foot", "head")}
-    others = (ends | set(robot.hands.values())) - {frame}
+    own_link, hands = robot.link_of(frame), set(robot.hands.values())
+    beyond = {x for x in hands if any(k.name == own_link for k in _chain(robot, x))}
+    others = (ends | hands) - {frame} - (beyond if len(beyond) == 1 else set())
     carrying = {link.name for x in others for link in _chain(robot, x)}
     own: list[Link] = []
     for link in _chain(robot, frame):

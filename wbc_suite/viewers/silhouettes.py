@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.robot import RobotDescription
+from wbc_suite.sensing.renderer import HIDDEN_GROUP, make_renderer
 from wbc_suite.typing import Vector
 
 SIDES = {"front": 180.0, "side": 90.0, "oblique": 135.0}  # azimuth of the camera, deg
@@ -19,18 +20,19 @@ def silhouettes(
     The extent of the picture is the fourth number of `at`, m.
     """
     solid = (m.geom_contype | m.geom_conaffinity) > 0
-    m.geom_group[:] = solid & (~solid).any()
-    option = mujoco.MjvOption()
-    option.geomgroup[:], option.sitegroup[:] = [1, 0, 0, 0, 0, 0], 0
+    m.geom_group[:] = np.where(solid & (~solid).any(), HIDDEN_GROUP, 0)
+    m.site_group[:] = HIDDEN_GROUP
     camera = mujoco.MjvCamera()
     camera.lookat[:], camera.distance, camera.elevation = at[:3], 1.3 * at[3], -15.0
+    labels = np.ones(m.ngeom + 1, dtype=np.int32)
+    labels[-1] = 0  # the background
     found: dict[str, NDArray[np.bool_]] = {}
-    with mujoco.Renderer(m, SIZE, SIZE) as renderer:
-        renderer.enable_segmentation_rendering()
+    with make_renderer(m, width=SIZE, height=SIZE) as renderer:
         for side, azimuth in SIDES.items():
             camera.azimuth = azimuth
-            renderer.update_scene(data, camera, scene_option=option)
-            found[side] = renderer.render()[..., 1] == int(mujoco.mjtObj.mjOBJ_GEOM)
+            renderer.update_scene(data, camera)
+            renderer.draw_surfaces()
+            found[side] = renderer.read_geoms(labels) > 0
     return found
 
 

@@ -65,9 +65,9 @@ class GripperController(PartController[ServoLaw]):
         self._synergy: Indices = np.array([k for k, _ in driven], dtype=np.int64)
         self._open = np.array([synergies[k].open[j] for k, j in driven])
         self._span = np.array([synergies[k].closed[j] for k, j in driven]) - self._open
-        self._leading = [
-            int(np.flatnonzero(self._synergy == k)[0]) for k in range(count)
-        ]
+        # of each synergy the joint that moves most: others may not move at all
+        moves = np.where(self._synergy == np.arange(count)[:, None], self._span, 0.0)
+        self._leading = np.abs(moves).argmax(axis=1)
         self.goal: Vector = np.zeros(count)
 
     @property

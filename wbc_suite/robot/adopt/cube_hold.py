@@ -1,5 +1,6 @@
 """Simulate a hand, alone, that closes on a cube and is shaken."""
 
+import math
 from collections.abc import Collection
 
 import mujoco
@@ -7,6 +8,7 @@ import numpy as np
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import (
+    Actuator,
     Contacts,
     Frame,
     Joint,
@@ -139,12 +141,18 @@ def _scene(hand: RobotDescription, synergy: Synergy, tcp: Frame) -> mujoco.MjMod
     return spec.compile()
 
 
-def _add_servo(spec: mujoco.MjSpec, joint: Joint) -> None:
+def servo_of(joint: Joint) -> Actuator:
+    """Return the servo that drives a joint of a gripper, with estimated gains."""
     effort = min(joint.effort or EFFORT, MOST_EFFORT[joint.type == "slide"])
-    stiffness = effort / YIELDING[joint.type == "slide"]
+    kp = effort / YIELDING[joint.type == "slide"]
     rotor = max(joint.armature, 1e-4 * effort)
-    actuator = spec.add_actuator(name=joint.name, target=joint.name)
-    actuator.trntype = mujoco.mjtTrn.mjTRN_JOINT
-    actuator.set_to_position(kp=stiffness, kv=2.0 * float(np.sqrt(stiffness * rotor)))
+    kd = 2.0 * math.sqrt(kp * rotor)
+    return Actuator(joint=joint.name, kind="position", kp=kp, kd=kd, effort=effort)
+
+
+def _add_servo(spec: mujoco.MjSpec, joint: Joint) -> None:
+    servo, actuator = servo_of(joint), spec.add_actuator(name=joint.name)
+    actuator.target, actuator.trntype = joint.name, mujoco.mjtTrn.mjTRN_JOINT
+    actuator.set_to_position(kp=servo.kp, kv=servo.kd)
     actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
-    actuator.forcerange = [-effort, effort]
+    actuator.forcerange = np.array([-1.0, 1.0]) * (servo.effort or 0.0)

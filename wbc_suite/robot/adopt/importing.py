@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 from wbc_suite import logs
 from wbc_suite.config_files import parse_model
 from wbc_suite.errors import DescriptionError, join_first, shortened
+from wbc_suite.robot.adopt.cube_hold import servo_of
 from wbc_suite.robot.adopt.grippers import Gripper, infer_grippers
 from wbc_suite.robot.adopt.limbs import (
     Limb,
@@ -29,7 +30,7 @@ from wbc_suite.robot.adopt.standing_posture import feet_are_level, standing_legs
 from wbc_suite.robot.adopt.wheels import find_wheels
 from wbc_suite.robot.adopt.working_posture import working_arms
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.elements import Frame, Link, rigid_bodies
+from wbc_suite.robot.elements import Actuator, Frame, Link, rigid_bodies
 from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
 from wbc_suite.robot.validation import RESERVED
 from wbc_suite.robot.wheel_drive import WHEELS, WheelDrive
@@ -220,6 +221,7 @@ def _with_grippers(
             frames.append(own.tcp.model_copy(update={"name": name}))
     update = {
         "links": _with_stops(robot.links, found.values(), source),
+        "actuators": _with_servos(robot, found.values()),
         "synergies": {group: (own.synergy,) for group, own in found.items()},
         "frames": tuple(frames),
         "keyframes": robot.keyframes | {"ready": ready},
@@ -251,6 +253,16 @@ def _with_stops(
         return link.model_copy(update={"joint": joint.model_copy(update=update)})
 
     return tuple(map(stopped, links))
+
+
+def _with_servos(
+    robot: RobotDescription, grippers: Iterable[Gripper]
+) -> tuple[Actuator, ...]:
+    """Return actuators with servos for joints of grippers in place of torque motors."""
+    driven = {joint for own in grippers for joint in own.synergy.open}
+    driven -= {x.joint for x in robot.actuators if x.kind != "motor"}
+    kept = [x for x in robot.actuators if x.joint not in driven]
+    return (*kept, *(servo_of(x) for x in robot.joints if x.name in driven))
 
 
 def _with_slabs(
