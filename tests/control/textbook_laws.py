@@ -168,6 +168,7 @@ class Osc(Textbook):
         J_all = _jacobian(state, point, body)
         wanted = self._wanted(state) - self._carried(state, J_all, others)
         J, M = J_all[:, dofs], state.mass_matrix()[np.ix_(dofs, dofs)]
+        J, wanted = self._weights()[:, None] * J, self._weights() * wanted
         rest, L = self._rest(state), np.linalg.cholesky(M)
         C, Q = self.factors(np.linalg.solve(L, J.T).T)
         z = Q.T @ np.linalg.solve(C, wanted - J @ rest)
@@ -175,6 +176,10 @@ class Osc(Textbook):
         if self.record["keep_direction"][0]:
             a += self.straightened(state, a, others, (L, C, Q))
         return a
+
+    def _weights(self):
+        """Return the weights of linear and angular accelerations, shape (6,)."""
+        return np.repeat([1.0, self.record["turn_weight"][0]], 3)
 
     @staticmethod
     def factors(Y):
@@ -234,7 +239,8 @@ class Osc(Textbook):
         high = np.concatenate([upper - a, drives["command_max"] - tau, np.zeros(2)])
         if (low <= 0.0).all() and (high >= 0.0).all():
             return np.zeros(n)
-        halves = np.kron(np.eye(2), np.ones((3, 1))) * self._pull(state)[:, None]
+        pull = self._weights() * self._pull(state)
+        halves = np.kron(np.eye(2), np.ones((3, 1))) * pull[:, None]
         halves = np.linalg.solve(C, halves)
         high[-2:] = np.linalg.norm(halves, axis=0)
         W = np.hstack([Q, halves / np.maximum(high[-2:], 1e-12)])
