@@ -49,6 +49,13 @@ GYRATION = 0.03  # radius of gyration of such a link, m
 FEW_MOTORS = "efforts and armatures are estimated: the file has few or none"
 WEAK_LIFTS = "efforts of lifts are estimated: those of the file are below their load"
 NO_ARMATURES = "armatures are estimated from efforts: the file has none"
+PAD: dict[str, Any] = {
+    "friction": (1.0, 0.05, 0.001),
+    "condim": 4,
+    "solref": (0.004, 1.0),
+}
+"""Contacts of hands, as those of our own Panda's fingers: with MuJoCo's defaults a cube
+turns between two convex hulls until it falls."""
 MAX_MESSAGE = 800  # largest number of characters of a list in a message
 
 
@@ -220,7 +227,9 @@ def _with_grippers(
             name = take(own.tcp.name, "frame")
             frames.append(own.tcp.model_copy(update={"name": name}))
     update = {
-        "links": _with_stops(robot.links, found.values(), source),
+        "links": _with_pads(
+            _with_stops(robot.links, found.values(), source), found.values()
+        ),
         "actuators": _with_servos(robot, found.values()),
         "synergies": {group: (own.synergy,) for group, own in found.items()},
         "frames": tuple(frames),
@@ -253,6 +262,24 @@ def _with_stops(
         return link.model_copy(update={"joint": joint.model_copy(update=update)})
 
     return tuple(map(stopped, links))
+
+
+def _with_pads(links: Sequence[Link], grippers: Iterable[Gripper]) -> tuple[Link, ...]:
+    """Return links of hands with contacts of `PAD` where the file states none."""
+    touching = {name for own in grippers for name in own.links}
+
+    def padded(link: Link) -> Link:
+        if link.name not in touching:
+            return link
+        shapes = [
+            shape.model_copy(
+                update={k: v for k, v in PAD.items() if getattr(shape, k) is None}
+            )
+            for shape in link.collision
+        ]
+        return link.model_copy(update={"collision": tuple(shapes)})
+
+    return tuple(map(padded, links))
 
 
 def _with_servos(
