@@ -133,7 +133,7 @@ def export_robot(
     from wbc_suite.robot import load_robot
 
     if (to is None) == (reader is None):
-        raise ConfigError("Give either --to FORMAT or --for READER.")
+        raise typer.BadParameter("give either --to FORMAT or --for READER.")
     if root is not None and to in ("mjcf", "toml"):
         raise ConfigError(
             f"--root is for URDF; with --to {to} there is none to choose."
