@@ -74,7 +74,10 @@ def gap(robot, values):
 
 @pytest.mark.parametrize(
     ("axis", "limits", "opened"),
-    [("0 1 0", (-0.1, 1.4), 1.4), ("0 -1 0", (-1.4, 0.1), -1.4)],
+    [
+        ("0 1 0", (-0.1, 1.4), 1.4),
+        ("0 -1 0", (-1.0471975512, 0.1), -1.0471975512),  # more digits than 6
+    ],
 )
 def test_one_jaw_against_a_fixed_one_is_a_gripper(tmp_path, axis, limits, opened):
     robot = wbc_suite.load_robot(write(tmp_path, jawed(limits, axis, "0.01 0 0.06")))

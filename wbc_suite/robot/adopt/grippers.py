@@ -378,8 +378,8 @@ class _Hand:
             synergy = Synergy(
                 gripper=group,
                 name="grasp",
-                open=_rounded(opened),
-                closed=_rounded(values),
+                open=opened,
+                closed=values,
             )
             reason = (
                 f"{what} {1e3 * gaps[0]:.0f} mm apart when open, and "
@@ -422,7 +422,3 @@ def _unit(vector: Vector) -> Vector:
     """Return the direction of a vector; z if it has none."""
     length = float(np.linalg.norm(vector))
     return vector / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
-
-
-def _rounded(values: dict[str, float]) -> dict[str, float]:
-    return {name: round(value, 6) for name, value in values.items()}

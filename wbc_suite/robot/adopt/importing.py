@@ -162,10 +162,7 @@ def describe_import(
         "keyframes": {"ready": infer_ready(checked)} | keyframes,
     }
     robot = parse_model(RobotDescription, data | others, **how)
-    try:
-        robot = _with_grippers(robot, source, names.take, slabs)
-    except ValueError as error:  # of MuJoCo's compiler
-        raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
+    robot = _with_grippers(robot, source, names.take, slabs)
     if wheeled is not None:
         on = "its root is planar" if wheeled.root else "on legs"
         LOG.warning("%s: it drives, %s: %s.", source, on, WheelDrive(robot))
@@ -212,11 +209,11 @@ def _with_grippers(
     slabs: Callable[[str], Sequence[dict[str, Any]]] | None,
 ) -> RobotDescription:
     """Return the robot with the synergies and grasps of its grippers, which open."""
-    found = infer_grippers(robot)
+    found = _grippers(robot, source)
     loose = {name for x in found.values() if not x.held for name in x.links}
     if slabs is not None and loose:
         cut = _with_slabs(robot, loose, slabs)
-        better = infer_grippers(cut) if cut != robot else found
+        better = _grippers(cut, source) if cut != robot else found
         if sum(x.held for x in better.values()) > sum(x.held for x in found.values()):
             robot, found = cut, better
     frames, ready = list(robot.frames), dict(robot.keyframes["ready"])
@@ -290,6 +287,13 @@ def _with_servos(
     driven -= {x.joint for x in robot.actuators if x.kind != "motor"}
     kept = [x for x in robot.actuators if x.joint not in driven]
     return (*kept, *(servo_of(x) for x in robot.joints if x.name in driven))
+
+
+def _grippers(robot: RobotDescription, source: Path) -> dict[str, Gripper]:
+    try:
+        return infer_grippers(robot)
+    except ValueError as error:  # of MuJoCo's compiler
+        raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
 
 
 def _with_slabs(
