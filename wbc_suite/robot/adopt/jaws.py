@@ -16,8 +16,8 @@ NEAR, WIDE = 0.02, 0.02
 ALONG = 0.5  # least length of the fixed jaw over that of the moving one
 TURNS = 73  # postures that are compared; 5 degrees of a full turn
 WRIST, FINGER = 2, 0.25
-"""Most joints before a palm, and greatest length of a finger, m. Those of the Shadow
-hand, of 2 joints and 0.15 m, are the most of 30 hands."""
+"""Most joints before a palm, and greatest length of a finger, m. The Shadow
+hand has 2 joints and 0.15 m; an arm has more."""
 OPENING = 1.6  # rad from closed to open of a jaw whose file states no limits
 
 
