@@ -283,7 +283,6 @@ def _frame(film: Image.Image, number: int) -> Image.Image:
             ["export", "Baxter", "--to", "urdf", "--gripper", "rigth=PandaGripper"],
             ["rigth", "Did you mean 'right'"],
         ),
-        (["export", "Panda"], ["--to", "--for"]),
         (["export", "Panda", "--to", "toml", "--root", "none"], ["--root", "URDF"]),
         (["list", "--catalogue", "nowhere"], ["nowhere", "does not exist"]),
         (["render", "Panda", "-o", "nowhere/a.png"], ["nowhere/a.png", "written"]),
