@@ -9,7 +9,6 @@ Usage: python benchmarks/exports.py [--quick] [--only TEXT] [--json FILE]
        [--environments DIR] [--table]
 """
 
-import datetime
 import importlib.util
 import json
 import subprocess
@@ -22,7 +21,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pinocchio as pin
-from harness.report import Report, machine, options, write_between
+from harness.report import Report, options, write_between, written_by
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.robot import RobotDescription, load_robot
@@ -226,9 +225,7 @@ def table(rows: list[Row]) -> str:
             f"{1e3 * masses:.2g}",
         )
         lines.append("| " + " | ".join(map(str, cells)) + " |")
-    day = datetime.datetime.now(datetime.UTC).date().isoformat()
-    made = f"Written by `python benchmarks/exports.py --table`, {day}, {machine()}."
-    return "\n".join([*lines, "", made])
+    return "\n".join([*lines, "", written_by("exports.py --table")])
 
 
 def main() -> None:

@@ -9,7 +9,6 @@ Usage: MUJOCO_GL=egl python benchmarks/silhouettes.py [--quick] [--only TEXT]
        [--json FILE] [--keep DIR] [--table]
 """
 
-import datetime
 import importlib.util
 import tempfile
 from collections.abc import Iterator
@@ -21,7 +20,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import trimesh
-from harness.report import Report, machine, options, write_between
+from harness.report import Report, options, write_between, written_by
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.robot import RobotDescription, load_robot
@@ -146,9 +145,7 @@ def table(rows: list[dict[str, Any]]) -> str:
         found = [(row["worst"], row["case"]) for row in rows if row["reader"] == reader]
         (least, name), good = min(found), sum(worst >= LEAST for worst, _ in found)
         lines.append(f"| {reader} | {len(found)} | {good} | {least:.4f} | {name} |")
-    day = datetime.datetime.now(datetime.UTC).date().isoformat()
-    made = f"Written by `python benchmarks/silhouettes.py --table`, {day}, {machine()}."
-    return "\n".join([*lines, "", made])
+    return "\n".join([*lines, "", written_by("silhouettes.py --table")])
 
 
 def main() -> None:

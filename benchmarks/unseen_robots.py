@@ -12,7 +12,6 @@ Usage: python benchmarks/unseen_robots.py [--quick] [--development] [--folder DI
 """
 
 import copy
-import datetime
 import logging
 import multiprocessing
 import re
@@ -29,7 +28,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pinocchio as pin
-from harness.report import Report, machine, options
+from harness.report import Report, options, written_by
 from import_corpus import UNSEEN_SECTION, progress, unpack
 
 from wbc_suite.control import load_composite_controller_config
@@ -481,11 +480,9 @@ def write_table(rows: list[Row], path: Path) -> None:
     dogs = [row for row in rows if row.get("feet", 0) >= FOUR]
     stand = sum(row.get("stand_faults") == [] for row in dogs)
     broken = sum(bool(row.get("traceback")) for row in rows)
-    now = datetime.datetime.now(tz=datetime.UTC)
     lines = [
         f"\n\n{UNSEEN_SECTION}",
-        "Written by `python benchmarks/unseen_robots.py --table FILE`, "
-        f"{now:%Y-%m-%d}, {machine()}.",
+        written_by("unseen_robots.py --table FILE"),
         "They were chosen before any of them was loaded; what they lacked is mended.",
         "",
         f"- {len(rows)} robots: {len(moved)} move by `wbc-suite demo FILE`, {spent} of",

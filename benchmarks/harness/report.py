@@ -146,6 +146,12 @@ def cell(value: Any) -> str:
     return f"{value:.3g}" if abs(value) >= 1e-4 or not value else f"{value:.0e}"
 
 
+def written_by(command: str) -> str:
+    """Return a sentence for a page: which command wrote it, when, and where."""
+    day = datetime.datetime.now(datetime.UTC).date().isoformat()
+    return f"Written by `python benchmarks/{command}`, {day}, {machine()}."
+
+
 def machine() -> str:
     """Return processor, system and Python in words."""
     name, info = platform.processor(), Path("/proc/cpuinfo")

@@ -74,12 +74,7 @@ def read_points(path: Path) -> Matrix:
     Raises:
         DescriptionError: If it is not a mesh.
     """
-    data = read_bytes(path, most=MAX_BYTES, error=DescriptionError)
-    try:
-        mesh = load_mesh(path, data)
-        points = np.asarray(mesh.vertices, np.float64) * unit_of(mesh)
-    except Exception as error:  # trimesh raises anything for a malformed file
-        raise DescriptionError(f"{path}: not a readable mesh: {error}.") from error
+    points, _ = read_triangles(path)
     if points.shape[1:] != (3,) or not len(points) or not np.isfinite(points).all():
         raise DescriptionError(f"{path}: not a readable mesh: no finite points.")
     return np.unique(points, axis=0)
@@ -93,9 +88,7 @@ def read_triangles(path: Path) -> tuple[Matrix, Indices]:
     """
     data = read_bytes(path, most=MAX_BYTES, error=DescriptionError)
     try:
-        mesh = load_mesh(path, data)
-        faces = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), np.int64)
-        return np.asarray(mesh.vertices, np.float64) * unit_of(mesh), faces
+        return triangles_of(load_scene(path, data, skip_materials=True).to_geometry())
     except Exception as error:  # trimesh raises anything for a malformed file
         raise DescriptionError(f"{path}: not a readable mesh: {error}.") from error
 
@@ -103,11 +96,6 @@ def read_triangles(path: Path) -> tuple[Matrix, Indices]:
 def _trimesh() -> Any:
     """Import trimesh, which takes 0.3 s and has no types."""
     return importlib.import_module("trimesh")
-
-
-def load_mesh(path: Path, data: bytes) -> Any:
-    """Return trimesh's mesh of a file, or its points if it has no faces."""
-    return load_scene(path, data, skip_materials=True).to_geometry()
 
 
 def load_scene(path: Path, data: bytes, **options: Any) -> Any:
@@ -120,7 +108,9 @@ def load_scene(path: Path, data: bytes, **options: Any) -> Any:
         )
 
 
-def unit_of(mesh: Any) -> float:
-    """Return the length in m of the unit of trimesh's mesh."""
+def triangles_of(mesh: Any) -> tuple[Matrix, Indices]:
+    """Return vertices (n, 3), m, and triangles (m, 3) of trimesh's mesh, or points."""
     factor, times, _ = str(mesh.units).partition(" * ")  # "0.0254 * meters"
-    return float(factor) if times else 1.0
+    unit = float(factor) if times else 1.0
+    faces = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), np.int64)
+    return np.asarray(mesh.vertices, np.float64) * unit, faces

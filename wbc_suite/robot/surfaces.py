@@ -18,9 +18,14 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from wbc_suite.catalogue import user_cache
-from wbc_suite.errors import ConfigError, WbcError
+from wbc_suite.errors import ConfigError, DescriptionError, WbcError
 from wbc_suite.files import check_file, read_bytes
-from wbc_suite.robot.mesh_files import MAX_BYTES, load_mesh, load_scene, unit_of
+from wbc_suite.robot.mesh_files import (
+    MAX_BYTES,
+    load_scene,
+    read_triangles,
+    triangles_of,
+)
 from wbc_suite.robot.shapes import (
     Rgba,
     SkinMesh,
@@ -139,21 +144,20 @@ def _rgba(values: Any) -> Rgba | None:
 
 def _read_one(path: Path, scale: Vector3) -> Surface:
     """Read a file as one mesh, without its colours."""
-    data = read_bytes(path, most=MAX_BYTES)
     try:
-        mesh = load_mesh(path, data)
-        return _scaled(mesh, unit_of(mesh), scale)
-    except ConfigError:
-        raise
-    except Exception as error:  # trimesh raises anything for a malformed file
+        vertices, faces = read_triangles(path)
+    except DescriptionError as error:
+        raise ConfigError(str(error)) from error
+    try:
+        return _scaled(vertices, faces, scale)
+    except ValueError as error:
         raise ConfigError(f"{path}: not a readable mesh: {error}.") from error
 
 
-def _scaled(mesh: Any, unit: float, scale: Vector3) -> Surface:
+def _scaled(vertices: Matrix, faces: Indices, scale: Vector3) -> Surface:
     # a reflection turns the faces inside out
-    faces = mesh.faces[:, ::-1] if np.prod(scale) < 0.0 else mesh.faces
-    vertices = np.asarray(mesh.vertices, np.float64) * unit * scale
-    return Surface(*_merged(vertices, np.asarray(faces)))
+    turned = faces[:, ::-1] if np.prod(scale) < 0.0 else faces
+    return Surface(*_merged(vertices * scale, turned))
 
 
 def _colored(path: Path, scale: Vector3, folder: Path) -> Iterator[Surface]:
@@ -169,9 +173,9 @@ def _colored(path: Path, scale: Vector3, folder: Path) -> Iterator[Surface]:
         if colors is None:
             plain.setdefault(color, []).append(mesh)
         else:
-            yield from _painted(_scaled(mesh, unit_of(mesh), scale), colors)
+            yield from _painted(_scaled(*triangles_of(mesh), scale), colors)
     for color, meshes in plain.items():
-        parts = [_scaled(mesh, unit_of(mesh), scale) for mesh in meshes]
+        parts = [_scaled(*triangles_of(mesh), scale) for mesh in meshes]
         starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
         faces = [p.faces + start for p, start in zip(parts, starts, strict=True)]
         vertices = np.concatenate([part.vertices for part in parts])

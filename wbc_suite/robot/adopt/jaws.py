@@ -6,8 +6,9 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.robot.elements import Link, rigid_bodies
-from wbc_suite.robot.poses import se3_of
-from wbc_suite.robot.surface_points import surface_points
+from wbc_suite.robot.poses import rotation_matrix, se3_of
+from wbc_suite.robot.shape_geometry import hull_spheres
+from wbc_suite.robot.shapes import Shape
 from wbc_suite.typing import Matrix, Vector
 
 TIP = 0.01  # m; points of a finger that are so near to its farthest one are its tip
@@ -18,6 +19,7 @@ TURNS = 73  # postures that are compared; 5 degrees of a full turn
 WRIST, FINGER = 2, 0.25
 """Most joints before a palm, and greatest length of a finger, m. The Shadow
 hand has 2 joints and 0.15 m; an arm has more."""
+MORE = 400  # points between the corners of each shape
 OPENING = 1.6  # rad from closed to open of a jaw whose file states no limits
 
 
@@ -100,8 +102,25 @@ def points_on(links: Sequence[Link], body: str) -> Matrix:
     for link in links:
         if rigid[link.name] == body and (link.collision or link.visual):
             pose = _fixed_pose(links, link.name, body)
-            points = surface_points(link.collision or link.visual)
+            points = _surface_points(link.collision or link.visual)
             parts.append(points @ pose.rotation.T + pose.translation)
+    return np.concatenate(parts)
+
+
+def _surface_points(shapes: Sequence[Shape]) -> Matrix:
+    """Return the corners of convex shapes and points between, (n, 3), in their link.
+
+    Spheres count as their centres.
+    """
+    parts: list[Matrix] = []
+    rng = np.random.default_rng(0)
+    for shape in shapes:
+        corners = hull_spheres(shape)[:, :3]
+        shares = rng.dirichlet(np.full(3, 0.7), size=MORE)
+        chosen = corners[rng.integers(len(corners), size=(MORE, 3))]
+        between = np.einsum("nk,nki->ni", shares, chosen)
+        own = np.concatenate([corners, between])
+        parts.append(own @ rotation_matrix(shape).T + shape.pos)
     return np.concatenate(parts)
 
 
